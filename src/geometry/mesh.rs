@@ -1,0 +1,256 @@
+//! Triangle meshes: shared vertex arrays, and which triangles can be hit at all.
+
+use glam::{DVec3, Vec2, Vec3};
+use robust::{Coord, orient2d};
+
+use crate::error::{Error, Result};
+use crate::geometry::bounds::Bounds;
+
+/// Triangles over shared vertices, with optional attributes per vertex; absent attributes take no memory.
+///
+/// A triangle's number is its position in `indices`, which is the order of the file after polygons were cut into
+/// triangles. Triangles that cannot be hit stay in the array, so that numbers do not shift, and are listed in
+/// [`dropped`](Self::dropped); accelerators leave them out. Front faces are counter-clockwise.
+#[derive(Debug, Clone, Default)]
+pub struct TriangleMesh {
+    /// What to call the mesh in messages.
+    pub name: String,
+    /// Where the positions are relative to, in the file's coordinates: add it to a position to get the file's value.
+    pub origin: DVec3,
+    /// Vertex positions in object space, relative to `origin`.
+    pub positions: Vec<Vec3>,
+    /// Vertex numbers, three per triangle.
+    pub indices: Vec<[u32; 3]>,
+    /// Shading normals per vertex, of any length; zero means "use the face's".
+    pub normals: Option<Vec<Vec3>>,
+    /// Texture coordinates per vertex; the origin is the image's lower left corner, v goes up.
+    pub uvs: Option<Vec<Vec2>>,
+    /// Which of the scene's materials each triangle has.
+    pub materials: Materials,
+    /// Numbers of the triangles that cannot be hit, ascending; filled by [`finish`](Self::finish).
+    pub dropped: Vec<u32>,
+    /// Why they were dropped; filled by [`finish`](Self::finish).
+    pub dropped_counts: DroppedCounts,
+}
+
+/// The materials of a mesh's triangles, as positions in the scene's list.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Materials {
+    /// One for all.
+    One(u32),
+    /// One per triangle.
+    PerTriangle(Vec<u32>),
+}
+
+impl Default for Materials {
+    fn default() -> Self {
+        Self::One(0)
+    }
+}
+
+/// How many triangles were dropped, by reason.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
+pub struct DroppedCounts {
+    /// A vertex that is NaN, infinite or beyond 2^40 in magnitude.
+    pub non_finite: u64,
+    /// No area, decided exactly.
+    pub zero_area: u64,
+    /// A vertex number that is not in the file.
+    pub bad_index: u64,
+}
+
+impl DroppedCounts {
+    /// All of them.
+    pub fn total(&self) -> u64 {
+        self.non_finite + self.zero_area + self.bad_index
+    }
+}
+
+/// Coordinates of larger magnitude are treated as not finite. The triangle test multiplies three differences of
+/// coordinates: 32 times the cube of this must stay below the largest f32.
+const LARGEST_COORDINATE: f32 = (1u64 << 40) as f32;
+
+impl TriangleMesh {
+    /// Checks the arrays against each other and lists the triangles that cannot be hit. Loaders call it once.
+    ///
+    /// # Errors
+    /// A limit where a count does not fit 32 bits; a caller's error where an attribute array has another length than
+    /// `positions`.
+    pub fn finish(mut self) -> Result<Self> {
+        if u32::try_from(self.indices.len()).is_err() || u32::try_from(self.positions.len()).is_err() {
+            return Err(Error::limit(format!("mesh `{}` has more than 4294967295 triangles or vertices", self.name)));
+        }
+        let mismatch = |what: &str, have: usize| {
+            let name = &self.name;
+            Error::caller(format!("mesh `{name}` has {have} {what} for {} positions", self.positions.len()))
+        };
+        if let Some(normals) = &self.normals
+            && normals.len() != self.positions.len()
+        {
+            return Err(mismatch("normals", normals.len()));
+        }
+        if let Some(uvs) = &self.uvs
+            && uvs.len() != self.positions.len()
+        {
+            return Err(mismatch("texture coordinates", uvs.len()));
+        }
+        if let Materials::PerTriangle(materials) = &self.materials
+            && materials.len() != self.indices.len()
+        {
+            return Err(Error::caller(format!(
+                "mesh `{}` has {} materials for {} triangles",
+                self.name,
+                materials.len(),
+                self.indices.len()
+            )));
+        }
+        let mut counts = DroppedCounts::default();
+        let mut dropped = Vec::new();
+        for (number, indices) in self.indices.iter().enumerate() {
+            let reason = match indices.map(|i| self.positions.get(i as usize).copied()) {
+                [Some(a), Some(b), Some(c)] => {
+                    let usable = |p: Vec3| p.abs().cmple(Vec3::splat(LARGEST_COORDINATE)).all();
+                    if !(usable(a) && usable(b) && usable(c)) {
+                        &mut counts.non_finite
+                    } else if has_zero_area(a, b, c) {
+                        &mut counts.zero_area
+                    } else {
+                        continue;
+                    }
+                }
+                _ => &mut counts.bad_index,
+            };
+            *reason += 1;
+            dropped.push(number as u32);
+        }
+        self.dropped = dropped;
+        self.dropped_counts = counts;
+        Ok(self)
+    }
+
+    /// Number of triangles in the file, dropped ones included.
+    pub fn triangle_count(&self) -> usize {
+        self.indices.len()
+    }
+
+    /// The vertices of a triangle that was not dropped.
+    #[inline]
+    pub fn triangle(&self, number: u32) -> [Vec3; 3] {
+        self.indices[number as usize].map(|i| self.positions[i as usize])
+    }
+
+    /// The numbers of the triangles that can be hit, ascending.
+    pub fn live_triangles(&self) -> impl Iterator<Item = u32> + '_ {
+        let mut dropped = self.dropped.iter().copied().peekable();
+        (0..self.indices.len() as u32).filter(move |number| dropped.next_if_eq(number).is_none())
+    }
+
+    /// How many triangles can be hit.
+    pub fn live_count(&self) -> usize {
+        self.indices.len() - self.dropped.len()
+    }
+
+    /// The material of a triangle, as a position in the scene's list.
+    #[inline]
+    pub fn material(&self, number: u32) -> u32 {
+        match &self.materials {
+            Materials::One(material) => *material,
+            Materials::PerTriangle(materials) => materials[number as usize],
+        }
+    }
+
+    /// The box around the triangles that can be hit, relative to `origin`.
+    pub fn bounds(&self) -> Bounds {
+        self.live_triangles()
+            .fold(Bounds::EMPTY, |bounds, number| self.triangle(number).into_iter().fold(bounds, Bounds::with))
+    }
+
+    /// Replaces shading normals by ones computed from the faces: the mean of the faces around a vertex, weighted by
+    /// their angle there (Thürmer and Wüthrich 1998), where positions are equal bit for bit.
+    pub fn compute_normals(&mut self) {
+        use crate::math::vector::{cross, dot, normalize};
+        use std::collections::HashMap;
+        let key = |p: Vec3| (p + Vec3::ZERO).to_array().map(f32::to_bits);
+        let mut sums: HashMap<[u32; 3], DVec3> = HashMap::with_capacity(self.positions.len());
+        for number in self.live_triangles() {
+            let corners = self.triangle(number);
+            let p = corners.map(|corner| corner.as_dvec3());
+            let Some(face) = normalize(cross(p[1] - p[0], p[2] - p[0])) else { continue };
+            for i in 0..3 {
+                let (to_next, to_last) = (p[(i + 1) % 3] - p[i], p[(i + 2) % 3] - p[i]);
+                if let (Some(x), Some(y)) = (normalize(to_next), normalize(to_last)) {
+                    let angle = libm::acos(dot(x, y).clamp(-1.0, 1.0));
+                    *sums.entry(key(corners[i])).or_default() += face * angle;
+                }
+            }
+        }
+        let normal = |p: &Vec3| sums.get(&key(*p)).and_then(|&n| normalize(n)).unwrap_or(DVec3::ZERO).as_vec3();
+        self.normals = Some(self.positions.iter().map(normal).collect());
+    }
+
+    /// Bytes of the vertex and index arrays and attributes.
+    pub fn bytes(&self) -> usize {
+        let per_triangle = match &self.materials {
+            Materials::One(_) => 0,
+            Materials::PerTriangle(materials) => std::mem::size_of_val(materials.as_slice()),
+        };
+        std::mem::size_of_val(self.positions.as_slice())
+            + std::mem::size_of_val(self.indices.as_slice())
+            + self.normals.as_ref().map_or(0, |normals| std::mem::size_of_val(normals.as_slice()))
+            + self.uvs.as_ref().map_or(0, |uvs| std::mem::size_of_val(uvs.as_slice()))
+            + std::mem::size_of_val(self.dropped.as_slice())
+            + per_triangle
+    }
+}
+
+/// Whether the vertices are collinear or coincide, decided exactly: the triangle's shadows on the three coordinate
+/// planes are all flat, by adaptive-precision predicates (Shewchuk 1997).
+fn has_zero_area(a: Vec3, b: Vec3, c: Vec3) -> bool {
+    let flat = |i: usize, j: usize| {
+        let on_plane = |p: Vec3| Coord { x: f64::from(p[i]), y: f64::from(p[j]) };
+        orient2d(on_plane(a), on_plane(b), on_plane(c)) == 0.0
+    };
+    flat(0, 1) && flat(1, 2) && flat(2, 0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bad_triangles_are_dropped_and_counted_and_numbers_do_not_shift() {
+        let mesh = TriangleMesh {
+            positions: vec![
+                Vec3::ZERO,
+                Vec3::X,
+                Vec3::Y,
+                Vec3::new(2.0, 0.0, 0.0),
+                Vec3::new(f32::NAN, 0.0, 0.0),
+                Vec3::new(3e38, 0.0, 0.0),
+            ],
+            indices: vec![[0, 1, 3], [0, 1, 2], [0, 0, 1], [4, 1, 2], [5, 1, 2], [0, 1, 9], [2, 1, 0]],
+            ..Default::default()
+        };
+        let mesh = mesh.finish().unwrap();
+        assert_eq!(mesh.dropped, [0, 2, 3, 4, 5]);
+        assert_eq!(mesh.dropped_counts, DroppedCounts { non_finite: 2, zero_area: 2, bad_index: 1 });
+        assert_eq!(mesh.live_triangles().collect::<Vec<_>>(), [1, 6]);
+        assert_eq!(mesh.bounds(), Bounds { min: Vec3::ZERO, max: Vec3::new(1.0, 1.0, 0.0) });
+    }
+
+    #[test]
+    fn zero_area_is_decided_exactly() {
+        let (a, b) = (Vec3::new(0.1, 0.2, 0.3), Vec3::new(0.2, 0.4, 0.6));
+        let nearly = Vec3::new(0.4, 0.8f32.next_up(), 1.2);
+        assert!(has_zero_area(Vec3::ZERO, b, b * 2.0));
+        assert!(!has_zero_area(Vec3::ZERO, b, nearly));
+        assert!(!has_zero_area(Vec3::ZERO, Vec3::X * 1e-15, Vec3::Y * 1e-15));
+        assert!(has_zero_area(a, a, b));
+    }
+
+    #[test]
+    fn mismatched_attributes_are_refused() {
+        let mesh = TriangleMesh { positions: vec![Vec3::ZERO; 3], normals: Some(vec![]), ..Default::default() };
+        assert!(mesh.finish().is_err());
+    }
+}

@@ -1,0 +1,16 @@
+//! Shapes and what a ray does with each: rays, boxes, triangles, meshes and quadrics.
+
+pub mod bounds;
+pub mod hit;
+pub mod mesh;
+pub mod quadric;
+pub mod ray;
+pub mod shapes;
+pub mod triangle;
+
+pub use bounds::Bounds;
+pub use hit::{Hit, Key};
+pub use mesh::TriangleMesh;
+pub use quadric::Quadric;
+pub use ray::{PreparedRay, Ray};
+pub use triangle::{TriangleHit, intersect_triangle};

@@ -1,0 +1,4 @@
+//! Quadric surfaces.
+/// Placeholder.
+#[derive(Debug, Clone)]
+pub struct Quadric;

@@ -1,0 +1,191 @@
+//! Rays, and what is computed once per ray before it meets boxes and triangles.
+
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+
+/// A ray: the points `origin + t direction` for t in the closed interval `[t_min, t_max]`.
+///
+/// The direction need not have unit length; t is in its units. A negative `t_min` counts as 0: a ray starts at its
+/// origin. A ray with a NaN anywhere, an infinite origin or direction, a zero direction, or `t_min > t_max` meets
+/// nothing. The layout is that of ray files: eight little-endian f32.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Ray {
+    /// Where the ray starts.
+    pub origin: Vec3,
+    /// The smallest t that counts.
+    pub t_min: f32,
+    /// Where the ray goes, of any length.
+    pub direction: Vec3,
+    /// The largest t that counts; may be infinite.
+    pub t_max: f32,
+}
+
+impl Ray {
+    /// The ray from `origin` along `direction` with t from 0 to infinity.
+    pub fn new(origin: Vec3, direction: Vec3) -> Self {
+        Self { origin, t_min: 0.0, direction, t_max: f32::INFINITY }
+    }
+
+    /// Whether the ray can meet anything at all; see the type.
+    #[inline]
+    pub fn is_valid(&self) -> bool {
+        self.origin.is_finite()
+            && self.direction.is_finite()
+            && self.direction != Vec3::ZERO
+            && self.t_min <= self.t_max
+            && self.t_max >= 0.0
+    }
+}
+
+/// The part of a ray inside something, as the ends of an interval of t; empty if `near > far`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Interval {
+    /// Where the ray enters.
+    pub near: f32,
+    /// Where it leaves.
+    pub far: f32,
+}
+
+impl Interval {
+    /// All of t.
+    pub const ALL: Self = Self { near: f32::NEG_INFINITY, far: f32::INFINITY };
+
+    /// Whether nothing lies inside. NaN counts as empty.
+    #[inline(always)]
+    pub fn is_empty(&self) -> bool {
+        !(self.near <= self.far)
+    }
+
+    /// `t` moved into the interval, which must not be empty.
+    #[inline(always)]
+    pub fn clamp(&self, t: f32) -> f32 {
+        let t = if t > self.near { t } else { self.near };
+        if t < self.far { t } else { self.far }
+    }
+}
+
+/// A valid ray with everything that boxes and triangles need of it, in the space of what it will meet.
+#[derive(Debug, Clone, Copy)]
+pub struct PreparedRay {
+    /// Where the ray starts.
+    pub origin: Vec3,
+    /// Where it goes.
+    pub direction: Vec3,
+    /// 1 / direction per axis, not clamped: infinite, with the sign of the zero, where the direction is 0.
+    pub inverse: Vec3,
+    /// `inverse` made 2 ulp larger in magnitude, for the far planes of boxes (Ize 2013).
+    pub inverse_far: Vec3,
+    /// Whether the direction's sign bit is set, per axis: then a box is entered through its upper plane.
+    pub negative: [bool; 3],
+    /// Woop's axis order: `axes[2]` is the direction's largest component.
+    pub axes: [usize; 3],
+    /// Woop's shear: `d[axes[0]] / d[axes[2]]`, `d[axes[1]] / d[axes[2]]`, `1 / d[axes[2]]`.
+    pub shear: Vec3,
+    /// The smallest t that counts, at least 0.
+    pub t_min: f32,
+    /// The largest t that counts.
+    pub t_max: f32,
+    /// The ray's part inside the world box of the instance it was made for: every t is clamped into it. All of t in
+    /// world space.
+    pub clip: Interval,
+}
+
+impl PreparedRay {
+    /// Prepares a ray in world space; `None` if it can meet nothing.
+    #[inline]
+    pub fn new(ray: &Ray) -> Option<Self> {
+        ray.is_valid().then(|| Self::with_clip(ray.origin, ray.direction, ray.t_min, ray.t_max, Interval::ALL))
+    }
+
+    /// Prepares a ray that was brought into an instance's space; `None` if rounding left it without a direction.
+    #[inline]
+    pub fn local(origin: Vec3, direction: Vec3, world: &Self, clip: Interval) -> Option<Self> {
+        (origin.is_finite() && direction.is_finite() && direction != Vec3::ZERO)
+            .then(|| Self::with_clip(origin, direction, world.t_min, world.t_max, clip))
+    }
+
+    #[inline]
+    fn with_clip(origin: Vec3, direction: Vec3, t_min: f32, t_max: f32, clip: Interval) -> Self {
+        let inverse = Vec3::ONE / direction;
+        let magnitude = direction.abs();
+        // The largest component becomes z. Woop et al. swap x and y for negative z to keep the winding; both sides
+        // count here, so the order stays cyclic and only the sign of the determinant changes.
+        let z = if magnitude.x > magnitude.y {
+            if magnitude.x > magnitude.z { 0 } else { 2 }
+        } else if magnitude.y > magnitude.z {
+            1
+        } else {
+            2
+        };
+        let axes = [(z + 1) % 3, (z + 2) % 3, z];
+        let along = direction[z];
+        Self {
+            origin,
+            direction,
+            inverse,
+            inverse_far: Vec3::new(two_ulp_out(inverse.x), two_ulp_out(inverse.y), two_ulp_out(inverse.z)),
+            negative: [direction.x, direction.y, direction.z].map(f32::is_sign_negative),
+            axes,
+            shear: Vec3::new(direction[axes[0]] / along, direction[axes[1]] / along, 1.0 / along),
+            t_min: if t_min > 0.0 { t_min } else { 0.0 },
+            t_max,
+            clip,
+        }
+    }
+
+    /// The smallest t at which something in this space can still give a hit at or after `t`, clamping considered.
+    ///
+    /// Where the clip interval starts no earlier than `t`, hits before it are clamped up to it and count.
+    #[inline(always)]
+    pub fn lower_bound(&self, t: f32) -> f32 {
+        if self.clip.near >= t { 0.0 } else { t }
+    }
+
+    /// The largest t in this space that can still give a hit at or before `t`, clamping considered.
+    #[inline(always)]
+    pub fn upper_bound(&self, t: f32) -> f32 {
+        if self.clip.far <= t { f32::INFINITY } else { t }
+    }
+}
+
+/// The value 2 ulp farther from zero; infinities stay.
+#[inline(always)]
+fn two_ulp_out(x: f32) -> f32 {
+    const INFINITY_BITS: u32 = f32::INFINITY.to_bits();
+    let sign = x.to_bits() & 0x8000_0000;
+    let magnitude = (x.to_bits() & 0x7fff_ffff) + 2;
+    f32::from_bits(sign | if magnitude < INFINITY_BITS { magnitude } else { INFINITY_BITS })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bad_rays_are_recognised() {
+        let good = Ray::new(Vec3::ZERO, Vec3::X);
+        assert!(good.is_valid());
+        for bad in [
+            Ray { origin: Vec3::new(f32::NAN, 0.0, 0.0), ..good },
+            Ray { direction: Vec3::ZERO, ..good },
+            Ray { direction: Vec3::new(f32::INFINITY, 1.0, 0.0), ..good },
+            Ray { t_min: f32::NAN, ..good },
+            Ray { t_max: f32::NAN, ..good },
+            Ray { t_min: 2.0, t_max: 1.0, ..good },
+            Ray { t_min: -2.0, t_max: -1.0, ..good },
+        ] {
+            assert!(!bad.is_valid(), "{bad:?}");
+            assert!(PreparedRay::new(&bad).is_none());
+        }
+    }
+
+    #[test]
+    fn the_padded_inverse_is_two_ulp_out_and_keeps_infinities() {
+        assert_eq!(two_ulp_out(1.0), 1.0f32.next_up().next_up());
+        assert_eq!(two_ulp_out(-1.0), (-1.0f32).next_down().next_down());
+        assert_eq!(two_ulp_out(f32::INFINITY), f32::INFINITY);
+        assert_eq!(two_ulp_out(f32::NEG_INFINITY), f32::NEG_INFINITY);
+        assert_eq!(two_ulp_out(f32::MAX), f32::INFINITY);
+    }
+}

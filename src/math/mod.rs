@@ -1,0 +1,12 @@
+//! Arithmetic that gives the same bits everywhere.
+//!
+//! No fused multiply-add, no reassociation, no platform `pow` or trigonometry: sums are spelled out in one order, and
+//! transcendental functions come from the crate `libm`, which is pure Rust.
+
+pub mod float;
+pub mod quadratic;
+pub mod random;
+pub mod transform;
+pub mod vector;
+
+pub use transform::Transform;

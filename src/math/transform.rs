@@ -1,0 +1,148 @@
+//! Affine transforms in f64, with the inverse computed once.
+
+use glam::{DAffine3, DMat3, DVec3};
+
+use crate::error::{Error, Result};
+use crate::math::vector::{cross, dot};
+
+/// A non-singular affine map from object space to world space and its inverse, both f64.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Transform {
+    to_world: DAffine3,
+    to_object: DAffine3,
+}
+
+impl Transform {
+    /// The identity.
+    pub const IDENTITY: Self = Self { to_world: DAffine3::IDENTITY, to_object: DAffine3::IDENTITY };
+
+    /// Inverts `to_world`.
+    ///
+    /// # Errors
+    /// A caller's error for a matrix that is singular, or has a component that is infinite or NaN.
+    pub fn new(to_world: DAffine3) -> Result<Self> {
+        let m = to_world.matrix3;
+        let (x, y, z) = (m.x_axis, m.y_axis, m.z_axis);
+        let yz = cross(y, z);
+        let determinant = dot(x, yz);
+        let singular = || Error::caller("the transform is singular or not finite").remedy("scales must not be 0");
+        if !to_world.is_finite() || !(determinant.abs() > 0.0 && determinant.abs() < f64::INFINITY) {
+            return Err(singular());
+        }
+        let inverse =
+            DMat3::from_cols(yz / determinant, cross(z, x) / determinant, cross(x, y) / determinant).transpose();
+        let t = to_world.translation;
+        let translation = -apply(&inverse, t);
+        let to_object = DAffine3 { matrix3: inverse, translation };
+        if !to_object.is_finite() {
+            return Err(singular());
+        }
+        Ok(Self { to_world, to_object })
+    }
+
+    /// Object space to world space.
+    pub fn to_world(&self) -> &DAffine3 {
+        &self.to_world
+    }
+
+    /// World space to object space.
+    pub fn to_object(&self) -> &DAffine3 {
+        &self.to_object
+    }
+
+    /// Whether this is exactly the identity, which costs nothing to apply.
+    pub fn is_identity(&self) -> bool {
+        self.to_world == DAffine3::IDENTITY
+    }
+
+    /// Whether the map mirrors, so that it turns a counter-clockwise triangle clockwise.
+    pub fn is_mirroring(&self) -> bool {
+        let m = &self.to_world.matrix3;
+        dot(m.x_axis, cross(m.y_axis, m.z_axis)) < 0.0
+    }
+
+    /// A point from object to world space.
+    #[inline]
+    pub fn point_to_world(&self, p: DVec3) -> DVec3 {
+        apply(&self.to_world.matrix3, p) + self.to_world.translation
+    }
+
+    /// A direction from object to world space, not normalised.
+    #[inline]
+    pub fn vector_to_world(&self, v: DVec3) -> DVec3 {
+        apply(&self.to_world.matrix3, v)
+    }
+
+    /// A point from world to object space.
+    #[inline]
+    pub fn point_to_object(&self, p: DVec3) -> DVec3 {
+        apply(&self.to_object.matrix3, p) + self.to_object.translation
+    }
+
+    /// A direction from world to object space, not normalised: t is the same in both spaces.
+    #[inline]
+    pub fn vector_to_object(&self, v: DVec3) -> DVec3 {
+        apply(&self.to_object.matrix3, v)
+    }
+
+    /// A normal from object to world space by the inverse transpose, not normalised.
+    ///
+    /// The orientation follows the surface: outward stays outward under a mirror too.
+    #[inline]
+    pub fn normal_to_world(&self, n: DVec3) -> DVec3 {
+        let m = &self.to_object.matrix3;
+        DVec3::new(dot(m.x_axis, n), dot(m.y_axis, n), dot(m.z_axis, n))
+    }
+}
+
+/// `m v`, each component summed left to right.
+#[inline(always)]
+fn apply(m: &DMat3, v: DVec3) -> DVec3 {
+    m.x_axis * v.x + m.y_axis * v.y + m.z_axis * v.z
+}
+
+/// A rotation about the x, then the y, then the z axis (fixed axes); radians.
+///
+/// Uses `libm`, so that a rotated scene is the same on every machine.
+pub fn rotation_xyz(angles: DVec3) -> DMat3 {
+    let (sx, cx) = libm::sincos(angles.x);
+    let (sy, cy) = libm::sincos(angles.y);
+    let (sz, cz) = libm::sincos(angles.z);
+    let x = DMat3::from_cols(DVec3::X, DVec3::new(0.0, cx, sx), DVec3::new(0.0, -sx, cx));
+    let y = DMat3::from_cols(DVec3::new(cy, 0.0, -sy), DVec3::Y, DVec3::new(sy, 0.0, cy));
+    let z = DMat3::from_cols(DVec3::new(cz, sz, 0.0), DVec3::new(-sz, cz, 0.0), DVec3::Z);
+    let product = |a: &DMat3, b: &DMat3| DMat3::from_cols(apply(a, b.x_axis), apply(a, b.y_axis), apply(a, b.z_axis));
+    product(&z, &product(&y, &x))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn singular_and_nan_matrices_are_typed_errors() {
+        assert!(Transform::new(DAffine3::from_scale(DVec3::new(1.0, 1.0, 0.0))).is_err());
+        assert!(Transform::new(DAffine3::from_translation(DVec3::new(0.0, f64::NAN, 0.0))).is_err());
+        assert!(Transform::new(DAffine3::from_scale(DVec3::splat(f64::INFINITY))).is_err());
+    }
+
+    #[test]
+    fn points_go_there_and_back_and_normals_stay_perpendicular() {
+        let m = DMat3::from_cols(DVec3::new(2.0, 0.1, 0.0), DVec3::new(10.0, 1e-3, 0.5), DVec3::new(0.0, 3.0, -1.0));
+        let t = Transform::new(DAffine3 { matrix3: m, translation: DVec3::new(5.0, -7.0, 9.0) }).unwrap();
+        let p = DVec3::new(0.3, -0.7, 1.1);
+        assert!((t.point_to_object(t.point_to_world(p)) - p).abs().max_element() < 1e-12);
+        let (u, v) = (DVec3::new(1.0, 2.0, 3.0), DVec3::new(-1.0, 0.5, 2.0));
+        let n = t.normal_to_world(cross(u, v));
+        assert!(dot(n, t.vector_to_world(u)).abs() < 1e-12 && dot(n, t.vector_to_world(v)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn rotations_turn_by_the_right_hand_rule() {
+        let quarter = std::f64::consts::FRAC_PI_2;
+        let near = |a: DVec3, b: DVec3| (a - b).abs().max_element() < 1e-15;
+        assert!(near(rotation_xyz(DVec3::new(quarter, 0.0, 0.0)) * DVec3::Y, DVec3::Z));
+        assert!(near(rotation_xyz(DVec3::new(0.0, quarter, 0.0)) * DVec3::Z, DVec3::X));
+        assert!(near(rotation_xyz(DVec3::new(0.0, 0.0, quarter)) * DVec3::X, DVec3::Y));
+    }
+}

@@ -1,0 +1,67 @@
+//! How to render, and what it took.
+
+use crate::render::film::AovKind;
+
+/// A part of the picture in pixels: origin top left, half-open.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+pub struct Crop {
+    /// First column.
+    pub x0: u32,
+    /// First row.
+    pub y0: u32,
+    /// One past the last column.
+    pub x1: u32,
+    /// One past the last row.
+    pub y1: u32,
+}
+
+/// What does not change a pixel's value, only which pixels are rendered and by whom.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct RenderSettings {
+    /// Number of threads; 0 takes one per processor.
+    pub threads: usize,
+    /// Render this part alone.
+    pub crop: Option<Crop>,
+    /// Extra values to record.
+    pub aovs: Vec<AovKind>,
+}
+
+/// Rays traced, by kind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
+pub struct RayCounts {
+    /// Camera rays.
+    pub camera: u64,
+    /// Shadow rays, one a light that faces the point.
+    pub shadow: u64,
+    /// Mirror rays, total internal reflection included.
+    pub reflected: u64,
+    /// Rays that went through a surface.
+    pub refracted: u64,
+}
+
+impl RayCounts {
+    /// All of them.
+    pub fn total(&self) -> u64 {
+        self.camera + self.shadow + self.reflected + self.refracted
+    }
+}
+
+impl std::ops::AddAssign for RayCounts {
+    fn add_assign(&mut self, other: Self) {
+        self.camera += other.camera;
+        self.shadow += other.shadow;
+        self.reflected += other.reflected;
+        self.refracted += other.refracted;
+    }
+}
+
+/// What a rendering took.
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
+pub struct RenderStats {
+    /// Rays by kind.
+    pub rays: RayCounts,
+    /// Wall-clock seconds from the first camera ray to the finished linear film.
+    pub seconds: f64,
+    /// Threads that were used.
+    pub threads: usize,
+}

@@ -1,0 +1,1 @@
+//! The camera and lights of a bare model.

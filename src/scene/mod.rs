@@ -1,0 +1,97 @@
+//! What there is to see, as plain data without input or output: every loader makes it, the renderer reads it.
+
+pub mod auto;
+pub mod background;
+pub mod camera;
+pub mod film;
+pub mod light;
+pub mod material;
+pub mod needs;
+pub mod object;
+pub mod texture;
+
+pub use background::Background;
+pub use camera::{Camera, NamedCamera, Projection};
+pub use film::{Clamp, FilmSettings, Transfer};
+pub use light::{Falloff, Light, LightKind};
+pub use material::{Material, TextureRef};
+pub use object::{Object, Shape};
+pub use texture::Texture;
+
+use glam::DVec3;
+
+use crate::geometry::{Quadric, TriangleMesh};
+
+/// A linear colour or weight, red, green, blue (Rec. 709 primaries).
+pub type Rgb = glam::Vec3;
+
+/// A whole scene.
+///
+/// Positions of cameras and lights and the transforms of objects are f64 in the file's coordinates; they are made
+/// relative to [`origin`](Self::origin) when the scene is built.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    /// Where the renderer's f32 world has its zero, in the file's coordinates.
+    pub origin: DVec3,
+    /// Scene-wide ambient factor: materials without an ambient colour of their own have this times their base colour.
+    pub ambient: Rgb,
+    /// What rays that hit nothing see.
+    pub background: Background,
+    /// All cameras; never empty once a loader returned it.
+    pub cameras: Vec<NamedCamera>,
+    /// Which camera to render through.
+    pub active_camera: usize,
+    /// Picture size, samples, depth, clamp and encoding.
+    pub film: FilmSettings,
+    /// Lights, in file order.
+    pub lights: Vec<Light>,
+    /// Materials that meshes and objects refer to by position; never empty.
+    pub materials: Vec<Material>,
+    /// Images that materials refer to by position.
+    pub textures: Vec<Texture>,
+    /// Meshes that objects refer to by position.
+    pub meshes: Vec<TriangleMesh>,
+    /// Quadrics that objects refer to by position.
+    pub quadrics: Vec<Quadric>,
+    /// What there is to hit, in file order: an object's position is its instance number.
+    pub objects: Vec<Object>,
+}
+
+impl Default for Scene {
+    /// An empty scene with one neutral material and no camera.
+    fn default() -> Self {
+        Self {
+            origin: DVec3::ZERO,
+            ambient: Rgb::splat(0.1),
+            background: Background::default(),
+            cameras: Vec::new(),
+            active_camera: 0,
+            film: FilmSettings::default(),
+            lights: Vec::new(),
+            materials: vec![Material::default()],
+            textures: Vec::new(),
+            meshes: Vec::new(),
+            quadrics: Vec::new(),
+            objects: Vec::new(),
+        }
+    }
+}
+
+impl Scene {
+    /// The camera to render through.
+    ///
+    /// # Panics
+    /// If the scene has no camera; loaders always give one.
+    pub fn camera(&self) -> &Camera {
+        &self.cameras[self.active_camera].camera
+    }
+
+    /// Number of triangles with every instance counted, dropped ones left out.
+    pub fn instanced_triangles(&self) -> u64 {
+        let count = |object: &Object| match object.shape {
+            Shape::Mesh(mesh) => self.meshes[mesh as usize].live_count() as u64,
+            Shape::Quadric(_) => 0,
+        };
+        self.objects.iter().map(count).sum()
+    }
+}

@@ -1,0 +1,1 @@
+//! What a scene uses, counted once after loading.
