@@ -1,5 +1,6 @@
 //! Files in and pictures out. Readers return plain scene data; nothing here knows how rays are traced.
 
+pub mod image_file;
 pub mod ledger;
 
 use std::path::Path;
