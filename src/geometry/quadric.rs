@@ -1,4 +1,555 @@
-//! Quadric surfaces.
-/// Placeholder.
-#[derive(Debug, Clone)]
-pub struct Quadric;
+//! General quadric surfaces: `X^T A X = 0` in homogeneous object-space coordinates, in f64 throughout.
+//!
+//! A ray is brought into object space in f64 and moved to its closest approach to the quadric's centre, where the
+//! quadratic along the ray has its digits where they matter; the discriminant is Kahan's (`math::quadratic`).
+
+use glam::{DVec2, DVec3};
+
+use crate::error::{Error, Result};
+use crate::geometry::bounds::Bounds;
+use crate::math::float::{round_down_vec, round_up_vec};
+use crate::math::quadratic::{Roots, solve};
+use crate::math::vector::{dot, length, normalize};
+
+/// A closed object-space box that cuts a quadric; sides may be infinite.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Clip {
+    /// The least corner.
+    pub min: DVec3,
+    /// The greatest corner.
+    pub max: DVec3,
+}
+
+impl Clip {
+    /// No clipping at all.
+    pub const NONE: Self = Self { min: DVec3::NEG_INFINITY, max: DVec3::INFINITY };
+
+    /// Between two heights.
+    pub const fn between(y0: f64, y1: f64) -> Self {
+        Self {
+            min: DVec3::new(f64::NEG_INFINITY, y0, f64::NEG_INFINITY),
+            max: DVec3::new(f64::INFINITY, y1, f64::INFINITY),
+        }
+    }
+
+    fn contains(&self, p: DVec3) -> bool {
+        self.min.cmple(p).all() && self.max.cmpge(p).all()
+    }
+}
+
+/// How texture coordinates lie on a quadric; u, v from the lower left of the image, not mirrored seen from outside.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Mapping {
+    /// Longitude and latitude around the centre; the image's middle faces +Z, its top +Y.
+    Spherical,
+    /// Longitude, and height between `y0` and `y1`.
+    Cylindrical {
+        /// Height where v is 0.
+        y0: f64,
+        /// Height where v is 1.
+        y1: f64,
+    },
+    /// x and -z; one image over `[-half_size, half_size]`.
+    Planar {
+        /// Half the side of one image.
+        half_size: f64,
+    },
+}
+
+/// A quadric surface, possibly clipped by a box, either as a bare surface or as the boundary of the solid
+/// `{ F <= 0 }` within the box.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Quadric {
+    /// Where the coefficients below are centred, object space.
+    center: DVec3,
+    /// Diagonal of the quadratic part: x^2, y^2, z^2.
+    squares: DVec3,
+    /// Off-diagonal of the quadratic part: xy, yz, xz.
+    mixed: DVec3,
+    /// Half the gradient at the centre.
+    linear: DVec3,
+    /// The value at the centre.
+    constant: f64,
+    clip: Clip,
+    solid: bool,
+    bounds: Option<Bounds>,
+    mapping: Mapping,
+    /// The ten coefficients as given, for `info` and saving.
+    coefficients: [f64; 10],
+}
+
+/// A point where a line crosses a quadric.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Crossing {
+    /// Line parameter.
+    pub t: f64,
+    /// 0 or 1: the first or second root along the line; 2 to 7: the cap at -x, +x, -y, +y, -z, +z.
+    pub surface: u32,
+}
+
+/// The crossings of a line with a quadric, ascending in t: at most four.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Crossings {
+    list: [Option<Crossing>; 4],
+    count: usize,
+}
+
+impl Crossings {
+    fn push(&mut self, t: f64, surface: u32) {
+        let repeats = self.count > 0 && self.list[self.count - 1] == Some(Crossing { t, surface });
+        if t.is_finite() && !repeats {
+            self.list[self.count] = Some(Crossing { t, surface });
+            self.count += 1;
+        }
+    }
+
+    /// In ascending order.
+    pub fn iter(&self) -> impl Iterator<Item = Crossing> + '_ {
+        self.list.iter().copied().map_while(|crossing| crossing)
+    }
+}
+
+/// What shading needs of a point on a quadric, object space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct QuadricPoint {
+    /// The point.
+    pub position: DVec3,
+    /// Unit normal, towards F > 0: outward for solids.
+    pub normal: DVec3,
+}
+
+/// The quadratic `a s^2 + 2 b s + c` along a line, s counted from the closest approach at `t0`.
+struct Along {
+    t0: f64,
+    start: DVec3,
+    a: f64,
+    b: f64,
+    c: f64,
+}
+
+impl Quadric {
+    /// The surface `a x^2 + b y^2 + c z^2 + 2 d xy + 2 e yz + 2 f xz + 2 g x + 2 h y + 2 i z + j = 0`, coefficients
+    /// in that order (the seed's), optionally clipped; `solid` closes the clip's cuts with caps, which bound the
+    /// solid where the left side is negative.
+    ///
+    /// # Errors
+    /// A caller's error for coefficients that are all zero or not finite, and for a clip box that is empty or NaN.
+    pub fn new(coefficients: [f64; 10], clip: Option<Clip>, solid: bool) -> Result<Self> {
+        let clip = clip.unwrap_or(Clip::NONE);
+        if !coefficients.iter().all(|c| c.is_finite()) {
+            return Err(Error::caller("a quadric's coefficients must be finite"));
+        }
+        let largest = coefficients.iter().fold(0.0f64, |largest, c| largest.max(c.abs()));
+        if largest == 0.0 {
+            return Err(Error::caller("all coefficients of the quadric are 0").remedy("at least one must not be"));
+        }
+        if !clip.min.cmple(clip.max).all() {
+            return Err(Error::caller("the quadric's clip box is empty").remedy("min must not exceed max"));
+        }
+
+        // A power of two brings the largest coefficient near 1 without rounding.
+        let scale = libm::ldexp(1.0, -libm::ilogb(largest));
+        let [a, b, c, d, e, f, g, h, i, j] = coefficients.map(|k| k * scale);
+        let mut quadric = Self {
+            center: DVec3::ZERO,
+            squares: DVec3::new(a, b, c),
+            mixed: DVec3::new(d, e, f),
+            linear: DVec3::new(g, h, i),
+            constant: j,
+            clip,
+            solid,
+            bounds: None,
+            mapping: Mapping::Spherical,
+            coefficients,
+        };
+        quadric.recenter();
+        quadric.bounds = quadric.find_bounds();
+        Ok(quadric)
+    }
+
+    /// The surface `X^T A X = 0` for a 4x4 matrix stored column by column (the seed's `coeffMatrix`). What `A` has
+    /// beyond its symmetric part does not change the surface and is ignored.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn from_matrix(column_major: [f64; 16], clip: Option<Clip>, solid: bool) -> Result<Self> {
+        let m = |row: usize, column: usize| column_major[4 * column + row];
+        let mean = |row: usize, column: usize| 0.5 * m(row, column) + 0.5 * m(column, row);
+        let off = [mean(0, 1), mean(1, 2), mean(0, 2), mean(0, 3), mean(1, 3), mean(2, 3)];
+        let [d, e, f, g, h, i] = off;
+        Self::new([m(0, 0), m(1, 1), m(2, 2), d, e, f, g, h, i, m(3, 3)], clip, solid)
+    }
+
+    /// A quadric whose extent and texture mapping are known; `bounds` must contain the clipped surface.
+    pub(crate) fn shaped(
+        coefficients: [f64; 10],
+        clip: Clip,
+        solid: bool,
+        bounds: Option<(DVec3, DVec3)>,
+        mapping: Mapping,
+    ) -> Self {
+        let quadric = Self::new(coefficients, Some(clip), solid).expect("named shapes have valid coefficients");
+        let bounds = bounds.map(|(min, max)| Bounds { min: round_down_vec(min), max: round_up_vec(max) });
+        Self { bounds, mapping, ..quadric }
+    }
+
+    /// The coefficients as given, in the seed's order.
+    pub fn coefficients(&self) -> &[f64; 10] {
+        &self.coefficients
+    }
+
+    /// A box around the clipped surface in object space; `None` if it goes to infinity.
+    pub fn bounds(&self) -> Option<Bounds> {
+        self.bounds
+    }
+
+    /// Whether cuts are closed by caps.
+    pub fn is_solid(&self) -> bool {
+        self.solid
+    }
+
+    /// All crossings of the line `origin + t direction` (object space, any length) with the clipped surface or, for a
+    /// solid, with its boundary; also those at negative t. A line within the surface crosses nothing.
+    #[doc(alias = "IntersectQuadratic")]
+    pub fn intersect_quadratic(&self, origin: DVec3, direction: DVec3) -> Crossings {
+        let mut crossings = Crossings::default();
+        let Some(along) = self.along(origin, direction) else { return crossings };
+        let roots = solve(along.a, along.b, along.c);
+        if !self.solid {
+            let mut push = |s: f64, surface: u32| {
+                if self.clip.contains(self.center + (along.start + direction * s)) {
+                    crossings.push(along.t0 + s, surface);
+                }
+            };
+            match roots {
+                Roots::None => {}
+                Roots::One(s) => push(s, 0),
+                Roots::Two(s0, s1) => {
+                    push(s0, 0);
+                    push(s1, 1);
+                }
+            }
+            return crossings;
+        }
+
+        // The solid: the parts of the line where F <= 0, each cut by the clip box; an end is a root or a cap.
+        let (enter, leave) = self.clip_interval(origin, direction);
+        let mut piece = |start: (f64, u32), end: (f64, u32)| {
+            let start = if start.0 > enter.0 { start } else { enter };
+            let end = if end.0 < leave.0 { end } else { leave };
+            if start.0 <= end.0 {
+                crossings.push(start.0, start.1);
+                if start.0 < end.0 {
+                    crossings.push(end.0, end.1);
+                }
+            }
+        };
+        const START: (f64, u32) = (f64::NEG_INFINITY, 0);
+        const END: (f64, u32) = (f64::INFINITY, 0);
+        match roots {
+            Roots::None if along.c < 0.0 => piece(START, END),
+            Roots::None => {}
+            Roots::One(s) => {
+                let root = (along.t0 + s, 0);
+                let slope = along.a * s + along.b;
+                if along.a > 0.0 && slope.abs() <= f64::EPSILON * along.b.abs() {
+                    piece(root, root);
+                } else if along.a < 0.0 {
+                    piece(START, END);
+                } else if slope > 0.0 {
+                    piece(START, root);
+                } else {
+                    piece(root, END);
+                }
+            }
+            Roots::Two(s0, s1) => {
+                let (first, second) = ((along.t0 + s0, 0), (along.t0 + s1, 1));
+                if along.a > 0.0 {
+                    piece(first, second);
+                } else {
+                    piece(START, first);
+                    piece(second, END);
+                }
+            }
+        }
+        crossings
+    }
+
+    /// The point that a crossing found, solved again for a line that may differ from the one that found it by
+    /// rounding: object space, unit normal. At a singular point (a cone's apex) the normal is `-direction`.
+    pub fn point(&self, origin: DVec3, direction: DVec3, surface: u32) -> QuadricPoint {
+        let against = || normalize(-direction).unwrap_or(DVec3::Y);
+        if surface >= 2 {
+            let axis = (surface as usize - 2) / 2;
+            let upper = surface % 2 == 1;
+            let plane = if upper { self.clip.max[axis] } else { self.clip.min[axis] };
+            let t = (plane - origin[axis]) / direction[axis];
+            let mut position = origin + direction * t;
+            position[axis] = plane;
+            let mut normal = DVec3::ZERO;
+            normal[axis] = if upper { 1.0 } else { -1.0 };
+            return QuadricPoint { position, normal };
+        }
+        let Some(along) = self.along(origin, direction) else {
+            return QuadricPoint { position: origin, normal: against() };
+        };
+        let s = match (solve(along.a, along.b, along.c), surface) {
+            (Roots::Two(_, s), 1) => s,
+            (Roots::Two(s, _) | Roots::One(s), _) => s,
+            // The line slipped past a tangent: take the closest point.
+            (Roots::None, _) if along.a != 0.0 => -along.b / along.a,
+            (Roots::None, _) => 0.0,
+        };
+        let local = along.start + direction * s;
+        let normal = normalize(self.multiply(local) + self.linear).unwrap_or_else(against);
+        QuadricPoint { position: self.center + local, normal }
+    }
+
+    /// Texture coordinates of a point found on `surface`.
+    pub fn uv(&self, position: DVec3, surface: u32) -> DVec2 {
+        let longitude = |p: DVec3| 0.5 + libm::atan2(p.x, p.z) / std::f64::consts::TAU;
+        if let (Mapping::Cylindrical { .. }, Some(bounds), true) = (self.mapping, &self.bounds, surface >= 2) {
+            // A cap shows the image inscribed in the square around it, upright seen from outside.
+            let half = f64::from(bounds.max.x);
+            let up = if surface == 4 { 0.5 } else { -0.5 };
+            return DVec2::new(0.5 + 0.5 * position.x / half, 0.5 + up * position.z / half);
+        }
+        match self.mapping {
+            Mapping::Spherical => {
+                let p = position - self.center;
+                let latitude = libm::asin((p.y / length(p).max(f64::MIN_POSITIVE)).clamp(-1.0, 1.0));
+                DVec2::new(longitude(p), 0.5 + latitude / std::f64::consts::PI)
+            }
+            Mapping::Cylindrical { y0, y1 } => DVec2::new(longitude(position), (position.y - y0) / (y1 - y0)),
+            Mapping::Planar { half_size } => {
+                DVec2::new(0.5 + 0.5 * position.x / half_size, 0.5 - 0.5 * position.z / half_size)
+            }
+        }
+    }
+
+    /// The value of F at a point of object space, up to a positive factor.
+    pub fn value(&self, p: DVec3) -> f64 {
+        let p = p - self.center;
+        dot(p, self.multiply(p)) + 2.0 * dot(self.linear, p) + self.constant
+    }
+
+    /// The quadratic part times a vector.
+    #[inline(always)]
+    fn multiply(&self, v: DVec3) -> DVec3 {
+        let (q, m) = (self.squares, self.mixed);
+        DVec3::new(
+            q.x * v.x + m.x * v.y + m.z * v.z,
+            m.x * v.x + q.y * v.y + m.y * v.z,
+            m.z * v.x + m.y * v.y + q.z * v.z,
+        )
+    }
+
+    /// The quadratic along a line; `None` for a line without direction.
+    #[inline]
+    fn along(&self, origin: DVec3, direction: DVec3) -> Option<Along> {
+        let from_center = origin - self.center;
+        let t0 = -dot(from_center, direction) / dot(direction, direction);
+        if !t0.is_finite() {
+            return None;
+        }
+        let start = from_center + direction * t0;
+        let along_direction = self.multiply(direction);
+        let at_start = self.multiply(start);
+        Some(Along {
+            t0,
+            start,
+            a: dot(direction, along_direction),
+            b: dot(start, along_direction) + dot(self.linear, direction),
+            c: dot(start, at_start) + 2.0 * dot(self.linear, start) + self.constant,
+        })
+    }
+
+    /// Where a line enters and leaves the clip box, with the numbers of the caps; empty if the first is larger.
+    fn clip_interval(&self, origin: DVec3, direction: DVec3) -> ((f64, u32), (f64, u32)) {
+        let (mut enter, mut leave) = ((f64::NEG_INFINITY, 0), (f64::INFINITY, 0));
+        for axis in 0..3 {
+            let inverse = 1.0 / direction[axis];
+            let (lower, upper) = (2 + 2 * axis as u32, 3 + 2 * axis as u32);
+            let (near, far) = if inverse.is_sign_negative() {
+                ((self.clip.max[axis], upper), (self.clip.min[axis], lower))
+            } else {
+                ((self.clip.min[axis], lower), (self.clip.max[axis], upper))
+            };
+            let (t_near, t_far) = ((near.0 - origin[axis]) * inverse, (far.0 - origin[axis]) * inverse);
+            // NaN (a line within a side) keeps the running bound.
+            if t_near > enter.0 {
+                enter = (t_near, near.1);
+            }
+            if t_far < leave.0 {
+                leave = (t_far, far.1);
+            }
+        }
+        (enter, leave)
+    }
+
+    /// Moves the coefficients to the point of the quadric's axis or centre that is nearest to the object's origin,
+    /// where the linear part vanishes as far as it can.
+    fn recenter(&mut self) {
+        if self.linear == DVec3::ZERO {
+            return;
+        }
+        let (values, vectors) = eigen(self.squares, self.mixed);
+        let largest = values.abs().max_element();
+        let mut center = DVec3::ZERO;
+        for k in 0..3 {
+            // Directions along which the surface hardly bends have no centre; 1e-12 separates them from rounding.
+            if values[k].abs() > 1e-12 * largest {
+                center -= vectors[k] * (dot(vectors[k], self.linear) / values[k]);
+            }
+        }
+        if !center.is_finite() {
+            return;
+        }
+        let bent = self.multiply(center);
+        self.constant += dot(center, bent) + 2.0 * dot(self.linear, center);
+        self.linear += bent;
+        self.center = center;
+    }
+
+    /// The box around the surface: an ellipsoid's from its dual, cut by the clip box; else the clip box.
+    fn find_bounds(&self) -> Option<Bounds> {
+        let (values, vectors) = eigen(self.squares, self.mixed);
+        let (mut min, mut max) = (self.clip.min, self.clip.max);
+        let same_sign = values.cmpgt(DVec3::ZERO).all() || values.cmplt(DVec3::ZERO).all();
+        if same_sign {
+            // Half extents of { p^T Q p = -j }: sqrt(-j (Q^-1)_ii). An imaginary ellipsoid is a point, never hit.
+            let inverse_diagonal = (0..3).fold(DVec3::ZERO, |sum, k| sum + vectors[k] * vectors[k] / values[k]);
+            let half = (inverse_diagonal * -self.constant).max(DVec3::ZERO).map(f64::sqrt);
+            // The eigenvalues are good to about 1e-15; allow for that.
+            let half = half * (1.0 + 1e-12);
+            min = min.max(self.center - half);
+            max = max.min(self.center + half);
+        }
+        (min.is_finite() && max.is_finite()).then(|| {
+            // An ellipsoid outside its clip box leaves nothing; keep a box that is not inside out.
+            Bounds { min: round_down_vec(min), max: round_up_vec(max.max(min)) }
+        })
+    }
+}
+
+/// Eigenvalues and unit eigenvectors of a symmetric 3x3 matrix (cyclic Jacobi, Golub and Van Loan 8.5).
+fn eigen(diagonal: DVec3, off: DVec3) -> (DVec3, [DVec3; 3]) {
+    let mut m = [[diagonal.x, off.x, off.z], [off.x, diagonal.y, off.y], [off.z, off.y, diagonal.z]];
+    let mut v = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    // Convergence is quadratic: 3x3 matrices are diagonal to the last bit after five or six sweeps.
+    for _ in 0..12 {
+        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
+            if m[p][q] == 0.0 {
+                continue;
+            }
+            let theta = (m[q][q] - m[p][p]) / (2.0 * m[p][q]);
+            let t = 1f64.copysign(theta) / (theta.abs() + (theta * theta + 1.0).sqrt());
+            let c = 1.0 / (t * t + 1.0).sqrt();
+            let s = t * c;
+            for k in 0..3 {
+                let (kp, kq) = (m[k][p], m[k][q]);
+                (m[k][p], m[k][q]) = (c * kp - s * kq, s * kp + c * kq);
+            }
+            for k in 0..3 {
+                let (pk, qk) = (m[p][k], m[q][k]);
+                (m[p][k], m[q][k]) = (c * pk - s * qk, s * pk + c * qk);
+            }
+            for row in &mut v {
+                let (kp, kq) = (row[p], row[q]);
+                (row[p], row[q]) = (c * kp - s * kq, s * kp + c * kq);
+            }
+            (m[p][q], m[q][p]) = (0.0, 0.0);
+        }
+    }
+    let column = |k: usize| DVec3::new(v[0][k], v[1][k], v[2][k]);
+    (DVec3::new(m[0][0], m[1][1], m[2][2]), [column(0), column(1), column(2)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn hits(q: &Quadric, o: [f64; 3], d: [f64; 3]) -> Vec<(f64, u32)> {
+        q.intersect_quadratic(o.into(), d.into()).iter().map(|c| (c.t, c.surface)).collect()
+    }
+
+    const SPHERE: [f64; 10] = [1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0];
+
+    #[test]
+    fn a_sphere_is_crossed_twice_touched_once_or_missed() {
+        let sphere = Quadric::new(SPHERE, None, false).unwrap();
+        assert_eq!(hits(&sphere, [0.0, 0.0, 3.0], [0.0, 0.0, -1.0]), [(2.0, 0), (4.0, 1)]);
+        assert_eq!(hits(&sphere, [1.0, 0.0, 3.0], [0.0, 0.0, -1.0]), [(3.0, 0)]);
+        assert_eq!(hits(&sphere, [1.0f64.next_up(), 0.0, 3.0], [0.0, 0.0, -1.0]), []);
+        assert_eq!(hits(&sphere, [0.0, 0.0, 0.0], [0.0, 2.0, 0.0]), [(-0.5, 0), (0.5, 1)]);
+    }
+
+    #[test]
+    fn the_matrix_form_is_column_major_and_symmetrised() {
+        // The paraboloid x^2 + z^2 = y with all of 2h in one half of the matrix.
+        let mut m = [0.0; 16];
+        (m[0], m[10], m[13]) = (1.0, 1.0, -1.0);
+        let q = Quadric::from_matrix(m, None, false).unwrap();
+        assert_eq!(hits(&q, [2.0, 10.0, 0.0], [0.0, -1.0, 0.0]), [(6.0, 0)]);
+    }
+
+    #[test]
+    fn a_far_sphere_given_by_coefficients_is_recentred() {
+        let d = 1e4;
+        let q = Quadric::new([1.0, 1.0, 1.0, 0.0, 0.0, 0.0, -d, 0.0, 0.0, d * d - 1.0], None, false).unwrap();
+        let found = hits(&q, [d, 0.0, 5.0], [0.0, 0.0, -1.0]);
+        assert!((found[0].0 - 4.0).abs() < 1e-8 && (found[1].0 - 6.0).abs() < 1e-8, "{found:?}");
+        let bounds = q.bounds().unwrap();
+        assert!((bounds.center() - DVec3::new(d, 0.0, 0.0)).abs().max_element() < 1e-3);
+    }
+
+    #[test]
+    fn degenerate_quadrics_follow_their_closed_forms() {
+        let z = 0.0;
+        // A plane as a quadric: 2 h y = 0.
+        let plane = Quadric::new([z, z, z, z, z, z, z, 0.5, z, z], None, false).unwrap();
+        assert_eq!(hits(&plane, [0.0, 2.0, 0.0], [1.0, -1.0, 0.0]), [(2.0, 0)]);
+        assert_eq!(hits(&plane, [0.0, 0.0, 0.0], [1.0, 0.0, 0.0]), [], "a line in the surface");
+        // Two planes x^2 = 1, a doubled plane x^2 = 0.
+        let pair = Quadric::new([1.0, z, z, z, z, z, z, z, z, -1.0], None, false).unwrap();
+        assert_eq!(hits(&pair, [-3.0, 0.0, 0.0], [1.0, 0.0, 0.0]), [(2.0, 0), (4.0, 1)]);
+        let double = Quadric::new([1.0, z, z, z, z, z, z, z, z, z], None, false).unwrap();
+        assert_eq!(hits(&double, [-3.0, 1.0, 0.0], [1.0, 0.0, 0.0]), [(3.0, 0)]);
+        // z = x y along a ruling and across it.
+        let saddle = Quadric::new([z, z, z, 0.5, z, z, z, z, -0.5, z], None, false).unwrap();
+        assert_eq!(hits(&saddle, [2.0, 3.0, 10.0], [0.0, 0.0, -1.0]), [(4.0, 0)]);
+        // Imaginary, point, constant: never hit except the point itself.
+        let imaginary = Quadric::new([1.0, 1.0, 1.0, z, z, z, z, z, z, 1.0], None, false).unwrap();
+        assert_eq!(hits(&imaginary, [0.0, 0.0, 5.0], [0.0, 0.0, -1.0]), []);
+        let constant = Quadric::new([z, z, z, z, z, z, z, z, z, 1.0], None, false).unwrap();
+        assert_eq!(hits(&constant, [0.0, 0.0, 5.0], [0.0, 0.0, -1.0]), []);
+        assert!(Quadric::new([0.0; 10], None, false).is_err());
+        assert!(Quadric::new([f64::NAN; 10], None, false).is_err());
+    }
+
+    #[test]
+    fn a_solid_half_sphere_has_a_cap() {
+        let upper = Clip::between(0.0, 2.0);
+        let half = Quadric::new(SPHERE, Some(upper), true).unwrap();
+        let found = hits(&half, [0.5, -3.0, 0.0], [0.0, 1.0, 0.0]);
+        assert_eq!((found.len(), found[0], found[1].1), (2, (3.0, 4), 1));
+        assert!((found[1].0 - (3.0 + 0.75f64.sqrt())).abs() < 1e-15 * 4.0);
+        let open = Quadric::new(SPHERE, Some(upper), false).unwrap();
+        assert_eq!(hits(&open, [0.5, -3.0, 0.0], [0.0, 1.0, 0.0]), found[1..]);
+        assert_eq!(hits(&half, [0.0, 1.5, 0.0], [1.0, 0.0, 0.0]), []);
+        let point = half.point(DVec3::new(0.5, -3.0, 0.0), DVec3::Y, 4);
+        assert_eq!((point.position, point.normal), (DVec3::new(0.5, 0.0, 0.0), -DVec3::Y));
+    }
+
+    #[test]
+    fn ellipsoid_bounds_come_from_the_dual() {
+        // x^2/4 + y^2/9 + z^2 = 1, rotated by 45 degrees in the xy plane.
+        let (a, b) = (0.25, 1.0 / 9.0);
+        let (mean, difference) = (0.5 * (a + b), 0.5 * (a - b));
+        let q = Quadric::new([mean, mean, 1.0, difference, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0], None, false).unwrap();
+        let bounds = q.bounds().unwrap();
+        let half = (0.5 * (4.0 + 9.0f64)).sqrt();
+        assert!((bounds.max.x as f64 - half).abs() < 1e-5 && (bounds.min.y as f64 + half).abs() < 1e-5);
+        assert!((bounds.max.z - 1.0).abs() < 1e-5);
+    }
+}
