@@ -1,1 +1,238 @@
-//! The camera and lights of a bare model.
+//! The camera, lights and background of a bare model: what makes a good picture with no set-up.
+
+use glam::DVec3;
+
+use crate::math::vector::{cross, dot, normalize};
+use crate::scene::{Background, Camera, Light, LightKind, NamedCamera, Projection, Rgb, Scene, Shape};
+
+/// A named direction to look from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum View {
+    /// From +Z.
+    Front,
+    /// From -Z.
+    Back,
+    /// From -X.
+    Left,
+    /// From +X.
+    Right,
+    /// From +Y, -Z pointing up in the picture.
+    Top,
+    /// From -Y.
+    Bottom,
+    /// From between +X, +Y and +Z.
+    Iso,
+}
+
+impl View {
+    /// Azimuth and elevation in radians, as [`frame`] takes them.
+    pub fn angles(self) -> (f64, f64) {
+        let (azimuth, elevation): (f64, f64) = match self {
+            Self::Front => (0.0, 0.0),
+            Self::Back => (180.0, 0.0),
+            Self::Left => (-90.0, 0.0),
+            Self::Right => (90.0, 0.0),
+            Self::Top => (0.0, 90.0),
+            Self::Bottom => (0.0, -90.0),
+            Self::Iso => (45.0, ISO_ELEVATION),
+        };
+        (azimuth.to_radians(), elevation.to_radians())
+    }
+}
+
+/// The elevation in degrees from which a cube's three visible faces look alike: atan(1 / sqrt 2).
+const ISO_ELEVATION: f64 = 35.264_389_682_754_654;
+
+/// From where a bare model is seen: a little from the right and above, degrees.
+const DEFAULT_ANGLES: (f64, f64) = (30.0, 18.0);
+
+/// Vertical field of view of the automatic camera, degrees: that of a portrait lens.
+pub const DEFAULT_FOV: f64 = 35.0;
+
+/// Empty border around the model, as a share of the picture on each side.
+const MARGIN: f64 = 0.06;
+
+/// Gives a scene that came from a bare model what it lacks: a camera that frames it, lights, a background.
+pub fn complete(scene: &mut Scene) {
+    scene.background = Background::Gradient { bottom: Rgb::splat(0.32), top: Rgb::new(0.80, 0.84, 0.90), up: DVec3::Y };
+    if scene.cameras.is_empty() {
+        let (azimuth, elevation) = DEFAULT_ANGLES;
+        let camera = frame(scene, azimuth.to_radians(), elevation.to_radians(), DEFAULT_FOV.to_radians());
+        scene.cameras.push(NamedCamera { name: "auto".into(), camera });
+    }
+    if scene.lights.is_empty() {
+        scene.lights = studio_lights(scene.camera());
+    }
+}
+
+/// A camera that sees the whole scene from a direction and fills the picture with it.
+///
+/// Angles in radians: azimuth 0 looks from +Z and grows towards +X, elevation grows towards +Y; `fov_y` is vertical.
+/// The four sides of the picture each touch the model's vertices, up to a margin, for the film's current size.
+pub fn frame(scene: &Scene, azimuth: f64, elevation: f64, fov_y: f64) -> Camera {
+    let (sin_a, cos_a) = libm::sincos(azimuth);
+    let (sin_e, cos_e) = libm::sincos(elevation);
+    let backward = DVec3::new(sin_a * cos_e, sin_e, cos_a * cos_e);
+    // Straight up or down, the horizon gives no direction: keep the azimuth's.
+    let up_hint = if cos_e.abs() < 1e-6 { DVec3::new(-sin_a, 0.0, -cos_a) * sin_e.signum() } else { DVec3::Y };
+    let right = normalize(cross(up_hint, backward)).unwrap_or(DVec3::X);
+    let up = cross(backward, right);
+
+    let aspect = f64::from(scene.film.width) / f64::from(scene.film.height);
+    let slope_y = libm::tan(0.5 * fov_y) * (1.0 - 2.0 * MARGIN);
+    let slope_x = slope_y * aspect;
+
+    // A point at depth z before the eye is in the picture if |x| <= slope_x z and |y| <= slope_y z. Each of the four
+    // sides bounds a linear function of the eye; the nearest eye that satisfies all has this closed form.
+    let mut sides = [f64::NEG_INFINITY; 4];
+    let mut nearest = f64::NEG_INFINITY;
+    let points = outline(scene);
+    for &p in &points {
+        let (x, y, z) = (dot(p, right), dot(p, up), dot(p, backward));
+        let limits = [x + slope_x * z, -x + slope_x * z, y + slope_y * z, -y + slope_y * z];
+        for (side, limit) in sides.iter_mut().zip(limits) {
+            *side = side.max(limit);
+        }
+        nearest = nearest.max(z);
+    }
+    if points.is_empty() {
+        sides = [slope_x, slope_x, slope_y, slope_y];
+        nearest = 0.0;
+    }
+    let [right_side, left_side, top_side, bottom_side] = sides;
+    let (x, y) = (0.5 * (right_side - left_side), 0.5 * (top_side - bottom_side));
+    let z = (0.5 * (right_side + left_side) / slope_x).max(0.5 * (top_side + bottom_side) / slope_y);
+    // A point-like model leaves no distance at all; stand one unit away.
+    let z = if z > nearest { z } else { nearest + 1.0 };
+    let eye = right * x + up * y + backward * z;
+    let target = eye - backward * (z - 0.5 * (nearest + depth_of_center(&points, backward, nearest)));
+    Camera::LookAt { eye, target, up, projection: Projection::Perspective { fov_y } }
+}
+
+/// The mean depth of the points along `backward`.
+fn depth_of_center(points: &[DVec3], backward: DVec3, fallback: f64) -> f64 {
+    if points.is_empty() {
+        return fallback;
+    }
+    points.iter().map(|&p| dot(p, backward)).sum::<f64>() / points.len() as f64
+}
+
+/// Points in the file's coordinates whose hull is that of the scene, or nearly: mesh vertices, every n-th of very large
+/// scenes, and the corners of the boxes of bounded quadrics.
+fn outline(scene: &Scene) -> Vec<DVec3> {
+    const MOST_POINTS: usize = 2_000_000;
+    let vertices = |shape: Shape| match shape {
+        Shape::Mesh(mesh) => scene.meshes[mesh as usize].live_count() * 3,
+        Shape::Quadric(_) => 8,
+    };
+    let total: usize = scene.objects.iter().map(|object| vertices(object.shape)).sum();
+    let stride = total.div_ceil(MOST_POINTS).max(1);
+    let mut points = Vec::new();
+    for object in &scene.objects {
+        match object.shape {
+            Shape::Mesh(mesh) => {
+                let mesh = &scene.meshes[mesh as usize];
+                let corners = mesh.live_triangles().flat_map(|number| mesh.triangle(number));
+                let place = |p: glam::Vec3| object.transform.transform_point3(mesh.origin + p.as_dvec3());
+                points.extend(corners.step_by(stride).map(place));
+            }
+            Shape::Quadric(quadric) => {
+                if let Some(bounds) = scene.quadrics[quadric as usize].bounds() {
+                    let corners = bounds.corners();
+                    points.extend(corners.iter().map(|p| object.transform.transform_point3(p.as_dvec3())));
+                }
+            }
+        }
+    }
+    points
+}
+
+/// Key, fill and rim light, fixed to the camera: from the upper left, the right and behind.
+fn studio_lights(camera: &Camera) -> Vec<Light> {
+    let (forward, up) = match *camera {
+        Camera::LookAt { eye, target, up, .. } => (normalize(target - eye), up),
+        Camera::FourPoint { .. } => (None, DVec3::Y),
+    };
+    let forward = forward.unwrap_or(DVec3::NEG_Z);
+    let right = normalize(cross(forward, up)).unwrap_or(DVec3::X);
+    let up = cross(right, forward);
+    let light = |name: &str, direction: DVec3, color: Rgb| Light {
+        name: name.into(),
+        kind: LightKind::Directional { direction },
+        color,
+    };
+    vec![
+        light("key", forward * 0.75 + right * 0.65 - up * 0.9, Rgb::new(0.80, 0.78, 0.74)),
+        light("fill", forward * 0.8 - right * 0.9 - up * 0.15, Rgb::new(0.22, 0.24, 0.27)),
+        light("rim", -forward * 0.8 - right * 0.35 - up * 0.6, Rgb::splat(0.30)),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::TriangleMesh;
+    use crate::scene::Object;
+    use glam::{DAffine3, Vec3};
+
+    fn cube() -> Scene {
+        let positions = crate::geometry::Bounds { min: Vec3::splat(-1.0), max: Vec3::ONE }.corners().to_vec();
+        let indices = vec![[0, 1, 2], [3, 2, 1], [4, 5, 6], [7, 6, 5], [0, 1, 4], [2, 3, 6]];
+        let mesh = TriangleMesh { positions, indices, ..Default::default() }.finish().unwrap();
+        let object = |x: f64| Object {
+            name: String::new(),
+            shape: Shape::Mesh(0),
+            transform: DAffine3::from_translation(DVec3::new(x, 0.0, 0.0)),
+            material: None,
+        };
+        Scene { meshes: vec![mesh], objects: vec![object(0.0), object(5.0)], ..Default::default() }
+    }
+
+    #[test]
+    fn every_vertex_is_framed_and_the_frame_is_tight() {
+        let scene = cube();
+        for (azimuth, elevation) in [(0.0, 0.0), (0.5, 0.3), (2.0, -1.0), View::Top.angles(), View::Bottom.angles()] {
+            let camera = frame(&scene, azimuth, elevation, 0.6);
+            let Camera::LookAt { eye, target, up, .. } = camera else { panic!() };
+            let forward = normalize(target - eye).unwrap();
+            let right = normalize(cross(forward, up)).unwrap();
+            let up = cross(right, forward);
+            let half = (0.3f64).tan();
+            let mut extent = 0.0f64;
+            for p in outline(&scene) {
+                let d = p - eye;
+                let z = dot(d, forward);
+                assert!(z > 0.0);
+                extent =
+                    extent.max((dot(d, right) / (z * half * 16.0 / 9.0)).abs()).max((dot(d, up) / (z * half)).abs());
+            }
+            assert!((extent - (1.0 - 2.0 * MARGIN)).abs() < 1e-9, "{azimuth} {elevation}: {extent}");
+        }
+    }
+
+    #[test]
+    fn views_look_from_where_they_say() {
+        let scene = cube();
+        let from = |view: View| {
+            let (azimuth, elevation) = view.angles();
+            let Camera::LookAt { eye, target, .. } = frame(&scene, azimuth, elevation, 0.6) else { panic!() };
+            normalize(eye - target).unwrap()
+        };
+        let near = |a: DVec3, b: DVec3| assert!((a - b).abs().max_element() < 1e-12, "{a} {b}");
+        near(from(View::Front), DVec3::Z);
+        near(from(View::Right), DVec3::X);
+        near(from(View::Left), -DVec3::X);
+        near(from(View::Back), -DVec3::Z);
+        near(from(View::Top), DVec3::Y);
+        near(from(View::Bottom), -DVec3::Y);
+        near(from(View::Iso), DVec3::ONE / 3f64.sqrt());
+    }
+
+    #[test]
+    fn an_empty_scene_still_has_a_camera_and_lights() {
+        let mut scene = Scene::default();
+        complete(&mut scene);
+        assert_eq!(scene.lights.len(), 3);
+        assert!(scene.camera().rays(8, 8, DVec3::ZERO).is_ok());
+    }
+}
