@@ -1,7 +1,9 @@
 //! Files in and pictures out. Readers return plain scene data; nothing here knows how rays are traced.
 
+pub mod atomic_file;
 pub mod image_file;
 pub mod ledger;
+pub mod picture;
 
 use std::path::Path;
 

@@ -1,0 +1,145 @@
+//! Files that are either written whole or not touched.
+
+use std::fs;
+use std::io::{BufWriter, Cursor, Seek, Write};
+use std::path::{Path, PathBuf};
+
+use crate::error::{Error, Fault, Result};
+
+/// What a file's content is written to.
+pub trait Sink: Write + Seek {}
+impl<T: Write + Seek> Sink for T {}
+
+/// Writes a file by `write` such that a reader never sees a part of it.
+///
+/// The content goes to a temporary file in the same folder, which takes the place of `path` once all is there; if
+/// `write` fails, `path` stays as it was. The file gets the permissions of any newly created file. A link is followed.
+/// What is no regular file (a device, a pipe) cannot be replaced: it receives the finished content.
+///
+/// # Errors
+/// Those of `write`, and the system's, with the path.
+pub fn write_atomically(path: &Path, write: impl FnOnce(&mut dyn Sink) -> Result<()>) -> Result<()> {
+    let system = |cause| Error::system(path, cause);
+    match fs::metadata(path) {
+        Ok(existing) if existing.is_dir() => {
+            return Err(Error::caller("is a folder").at_path(path).remedy("give the name of a file in it"));
+        }
+        Ok(existing) if !existing.is_file() => {
+            let mut content = Cursor::new(Vec::new());
+            write(&mut content).map_err(|error| error.at_path(path))?;
+            return fs::OpenOptions::new()
+                .write(true)
+                .open(path)
+                .and_then(|mut file| file.write_all(content.get_ref()))
+                .map_err(system);
+        }
+        _ => {}
+    }
+    let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
+    let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let temporary = temporary_file(folder).map_err(|cause| match cause.kind() {
+        std::io::ErrorKind::NotFound => {
+            Error::caller(format!("there is no folder `{}`", folder.display())).at_path(path).remedy("create it first")
+        }
+        _ => Error::new(Fault::System, format!("cannot create a file in `{}`: {}", folder.display(), plain(&cause)))
+            .at_path(path),
+    })?;
+    let mut buffered = BufWriter::new(temporary);
+    write(&mut buffered).map_err(|error| error.at_path(path))?;
+    let temporary = buffered.into_inner().map_err(|failed| system(failed.into_error()))?;
+    temporary.persist(&target).map_err(|failed| system(failed.error))?;
+    Ok(())
+}
+
+/// A temporary file whose permissions are those that the umask leaves of a normal file's, not the owner's alone.
+fn temporary_file(folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".whitted-").suffix(".tmp");
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    builder.tempfile_in(folder)
+}
+
+/// The cause of a failed operation on a temporary file, without that file's name.
+fn plain(cause: &std::io::Error) -> String {
+    cause
+        .raw_os_error()
+        .map_or_else(|| cause.kind().to_string(), |code| std::io::Error::from_raw_os_error(code).to_string())
+}
+
+/// `path` as seen from the folder of `file`, where that is possible; separators are `/`.
+pub fn relative_to(path: &Path, file: &Path) -> PathBuf {
+    let absolute = |path: &Path| fs::canonicalize(path).or_else(|_| std::path::absolute(path));
+    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let (Ok(path_there), Ok(folder)) = (absolute(path), absolute(folder)) else { return path.to_path_buf() };
+    let shared = path_there.components().zip(folder.components()).take_while(|(a, b)| a == b).count();
+    // Different drives have no way between them.
+    if shared == 0 {
+        return path_there;
+    }
+    let up = folder.components().skip(shared).map(|_| "..".as_ref());
+    up.chain(path_there.components().skip(shared).map(|part| part.as_os_str())).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failure_leaves_the_file_as_it_was_and_nothing_beside_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.txt");
+        fs::write(&path, "old").unwrap();
+        let failed = write_atomically(&path, |sink| {
+            sink.write_all(b"new").unwrap();
+            Err(Error::caller("no"))
+        });
+        assert_eq!(failed.unwrap_err().path(), Some(path.as_path()));
+        assert_eq!(fs::read_to_string(&path).unwrap(), "old");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+        write_atomically(&path, |sink| sink.write_all(b"new").map_err(|cause| Error::system(Path::new("x"), cause)))
+            .unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "new");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn permissions_are_those_of_any_new_file_and_links_are_followed() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let mode = |name: &str| fs::metadata(folder.path().join(name)).unwrap().permissions().mode();
+        fs::write(folder.path().join("plain"), "").unwrap();
+        write_atomically(&folder.path().join("ours"), |_| Ok(())).unwrap();
+        assert_eq!(mode("ours"), mode("plain"));
+        std::os::unix::fs::symlink("plain", folder.path().join("link")).unwrap();
+        write_atomically(&folder.path().join("link"), |sink| {
+            sink.write_all(b"through").unwrap();
+            Ok(())
+        })
+        .unwrap();
+        assert_eq!(fs::read_to_string(folder.path().join("plain")).unwrap(), "through");
+    }
+
+    #[test]
+    fn folders_are_refused_and_missing_ones_named() {
+        let folder = tempfile::tempdir().unwrap();
+        assert!(write_atomically(folder.path(), |_| Ok(())).unwrap_err().to_string().contains("is a folder"));
+        let missing = folder.path().join("no/a.png");
+        let message = write_atomically(&missing, |_| Ok(())).unwrap_err().to_string();
+        assert!(message.contains("there is no folder") && message.contains("create it first"), "{message}");
+    }
+
+    #[test]
+    fn relative_paths_lead_from_the_file_to_the_other() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["a/b", "c"] {
+            fs::create_dir_all(folder.path().join(name)).unwrap();
+        }
+        let model = folder.path().join("c/model.obj");
+        fs::write(&model, "").unwrap();
+        let file = folder.path().join("a/b/scene.toml");
+        assert_eq!(relative_to(&model, &file), Path::new("../../c/model.obj"));
+        assert_eq!(relative_to(&model, &folder.path().join("c/scene.toml")), Path::new("model.obj"));
+    }
+}
