@@ -1,7 +1,7 @@
 //! The figures of the Utah teapot (M. Newell, 1975; the bottom is F. Crow's, 1987), +Z up, the spout towards +X.
 //!
 //! The published list of 306 control points is highly regular and is kept here as what makes it up: 24 patches are
-//! quarters of surfaces of revolution, given by their profiles, and 8 are halves of the handle and of the spout, given
+//! quarters of surfaces of revolution, given by their rings, and 8 are halves of the handle and of the spout, given
 //! by the cross-sections of their control nets. Numbers are in units of 1e-5, in which all of them are whole.
 
 /// A bicubic Bezier patch: rows run along v, columns along u; the normal is `d/du x d/dv` and points outwards.
@@ -23,57 +23,47 @@ pub enum Part {
     Spout,
 }
 
-/// A surface of revolution: radius and height of the four rows of control points, and how far along its tangent a
-/// quarter circle's inner control points lie, in hundredths of the radius.
-struct Revolved {
-    part: Part,
-    profile: [[i64; 2]; 4],
-    roundness: [i64; 4],
-}
+/// A row of control points of a quarter turn: radius, how far along its tangents the inner two points lie, height.
+type Ring = [i64; 3];
 
-/// What most rows have; a true circle's best would be 55.2.
-const ROUND: [i64; 4] = [56; 4];
-
-/// From the top down.
+/// Surfaces of revolution, from the top down.
 ///
 /// The published knob has, instead of its top on the axis, a loop of control points 0.002 wide that folds the surface
 /// over itself. Here, as in many editions, the loop is drawn together to a point.
-const REVOLVED: [Revolved; 6] = [
+const REVOLVED: [(Part, [Ring; 4]); 6] = [
     // Rim.
-    Revolved {
-        part: Part::Body,
-        profile: [[140_000, 240_000], [133_750, 253_125], [143_750, 253_125], [150_000, 240_000]],
-        roundness: ROUND,
-    },
-    // Body, upper and lower.
-    Revolved {
-        part: Part::Body,
-        profile: [[150_000, 240_000], [175_000, 187_500], [200_000, 135_000], [200_000, 90_000]],
-        roundness: ROUND,
-    },
-    Revolved {
-        part: Part::Body,
-        profile: [[200_000, 90_000], [200_000, 45_000], [150_000, 22_500], [150_000, 15_000]],
-        roundness: ROUND,
-    },
+    (
+        Part::Body,
+        [
+            [140_000, 78_400, 240_000],
+            [133_750, 74_900, 253_125],
+            [143_750, 80_500, 253_125],
+            [150_000, 84_000, 240_000],
+        ],
+    ),
+    // Belly, upper and lower.
+    (
+        Part::Body,
+        [
+            [150_000, 84_000, 240_000],
+            [175_000, 98_000, 187_500],
+            [200_000, 112_000, 135_000],
+            [200_000, 112_000, 90_000],
+        ],
+    ),
+    (
+        Part::Body,
+        [[200_000, 112_000, 90_000], [200_000, 112_000, 45_000], [150_000, 84_000, 22_500], [150_000, 84_000, 15_000]],
+    ),
     // Bottom.
-    Revolved {
-        part: Part::Body,
-        profile: [[150_000, 15_000], [150_000, 7_500], [142_500, 0], [0, 0]],
-        roundness: ROUND,
-    },
-    // Knob; 0.45 is published where its radius of 0.8 would ask for 0.448.
-    Revolved {
-        part: Part::Lid,
-        profile: [[0, 315_000], [80_000, 315_000], [0, 285_000], [20_000, 270_000]],
-        roundness: [56, 0, 56, 56],
-    },
+    (Part::Body, [[150_000, 84_000, 15_000], [150_000, 84_000, 7_500], [142_500, 79_800, 0], [0, 0, 0]]),
+    // Knob.
+    (Part::Lid, [[0, 0, 315_000], [80_000, 45_000, 315_000], [0, 0, 285_000], [20_000, 11_200, 270_000]]),
     // Lid.
-    Revolved {
-        part: Part::Lid,
-        profile: [[20_000, 270_000], [40_000, 255_000], [130_000, 255_000], [130_000, 240_000]],
-        roundness: ROUND,
-    },
+    (
+        Part::Lid,
+        [[20_000, 11_200, 270_000], [40_000, 22_400, 255_000], [130_000, 72_800, 255_000], [130_000, 72_800, 240_000]],
+    ),
 ];
 
 /// A cross-section of a bent tube: x and z where it crosses the plane y = 0 first and last, and half its width.
@@ -122,17 +112,12 @@ const TUBES: [(Part, [Section; 4]); 4] = [
 /// All 32 patches and what they belong to.
 pub fn teapot() -> Vec<(Part, Patch)> {
     let mut patches = Vec::with_capacity(32);
-    for surface in &REVOLVED {
-        let mut quarter: Patch = std::array::from_fn(|row| {
-            let [radius, height] = surface.profile[row];
-            let inner = match surface.roundness[row] {
-                0 => 45_000,
-                hundredths => radius * hundredths / 100,
-            };
+    for (part, rings) in &REVOLVED {
+        let mut quarter = rings.map(|[radius, inner, height]| {
             [[radius, 0], [radius, -inner], [inner, -radius], [0, -radius]].map(|[x, y]| [x, y, height])
         });
         for _ in 0..4 {
-            patches.push((surface.part, quarter));
+            patches.push((*part, quarter));
             quarter = quarter.map(|row| row.map(|[x, y, z]| [y, -x, z]));
         }
     }
@@ -186,6 +171,9 @@ mod tests {
             [values.clone().min().unwrap(), values.max().unwrap()]
         };
         assert_eq!([range(0), range(1), range(2)], [[-300_000, 352_500], [-200_000, 200_000], [0, 315_000]]);
+        // All rings are equally round, at 0.56 of the radius, but the widest of the knob.
+        let odd = REVOLVED.iter().flat_map(|(_, rings)| rings).filter(|[radius, inner, _]| 100 * inner != 56 * radius);
+        assert_eq!(odd.collect::<Vec<_>>(), [&[80_000, 45_000, 315_000]]);
         // The pot is its own mirror image in the plane y = 0.
         assert!(points.iter().all(|&[x, y, z]| points.contains(&[x, -y, z])));
     }

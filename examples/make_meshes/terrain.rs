@@ -76,10 +76,10 @@ fn ground() -> Picture {
         let at = place(DVec2::new(u, 1.0 - v));
         let level = normal(at, 0.02).y;
         // Borders between the zones are frayed.
-        let above_sea = height(at) + 0.25 * noise(at * 3.0, 77);
-        let green = SAND.lerp(GRASS, smooth_step(0.08, 0.2, above_sea));
-        let bare = green.lerp(ROCK, smooth_step(0.8, 0.6, level).max(smooth_step(0.9, 1.4, above_sea)));
-        let color = bare.lerp(SNOW, smooth_step(1.5, 1.8, above_sea) * smooth_step(0.45, 0.65, level));
+        let above_sea = height(at) + 0.15 * noise(at * 3.0, 77);
+        let green = SAND.lerp(GRASS, smooth_step(0.04, 0.14, above_sea));
+        let bare = green.lerp(ROCK, smooth_step(0.8, 0.6, level).max(smooth_step(0.7, 1.0, above_sea)));
+        let color = bare.lerp(SNOW, smooth_step(0.95, 1.15, above_sea) * smooth_step(0.4, 0.6, level));
         (color * (1.0 + 0.12 * noise(at * 12.0, 78))).to_array().map(|value| value as u8)
     })
 }
@@ -106,7 +106,7 @@ fn height(at: DVec2) -> f64 {
     // The land sinks into the sea all around.
     let from_middle = (at / (SIZE / 2.0)).length_squared();
     let land = smooth_step(1.0, 0.1, from_middle);
-    land * (1.55 * ridges - 0.9 + 0.3 * detail) - 0.35 * (1.0 - land)
+    land * (1.1 * ridges - 0.62 + 0.2 * detail) - 0.35 * (1.0 - land)
 }
 
 /// Gradient noise (K. Perlin) between -1 and 1, without trigonometry: the gradients are eight directions.
@@ -154,7 +154,7 @@ mod tests {
     fn there_is_land_and_sea() {
         let mesh = mesh(4 * 50 * 50);
         let peak = mesh.positions.iter().map(|p| p.y).fold(f64::NEG_INFINITY, f64::max);
-        assert!(peak > 1.5 && peak < 5.0, "{peak}");
+        assert!(peak > 1.0 && peak < 3.0, "{peak}");
         let border = mesh.positions.iter().filter(|p| p.x.abs() == 10.0 || p.z.abs() == 5.0);
         assert!(border.into_iter().all(|p| p.y < 0.0));
     }
