@@ -1,18 +1,121 @@
-//! Acceleration structures: obvhs builds the trees; box test, triangle test and traversal are ours.
+//! Acceleration structures: obvhs finds which boxes belong together; boxes, box test, triangle test and traversal are
+//! ours, and every structure gives the same hits bit for bit.
+//!
+//! ```text
+//! boxes -> Topology (ploc) -> PairTree -> Bvh2     (triangles of one mesh)
+//!                          |          `-> BoxTree  (instances)
+//!                          `-> CwBvh               (triangles of one mesh)
+//! ```
+//!
+//! Why trees cannot disagree: a hit's t lies within the interval in which the ray crosses the triangle's own box, and
+//! [`Bounds::interval`](crate::geometry::Bounds::interval) is monotone, so every box around the triangle is entered no
+//! later than t and left no earlier. A traversal that skips only what is entered after its best hit, or left before its
+//! first admissible t, meets every hit that could win.
+//!
+//! To add a structure, write its file and add its line to [`for_each_accelerator!`](crate::for_each_accelerator).
 
-/// Which acceleration structure to use for triangles.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Kind {
-    /// The fastest one.
-    #[default]
-    Auto,
-    /// Every triangle, no tree: the reference.
-    Linear,
-    /// Binary tree.
-    Bvh2,
-    /// Compressed 8-wide tree.
-    CwBvh,
+mod box_tree;
+mod bvh2;
+mod cwbvh;
+mod leaf;
+mod linear;
+mod pair_tree;
+mod ploc;
+mod stack;
+mod stats;
+#[cfg(test)]
+mod tests;
+mod topology;
+
+pub use box_tree::BoxTree;
+pub use bvh2::Bvh2;
+pub use cwbvh::CwBvh;
+pub use linear::Linear;
+pub use stats::TreeStats;
+
+use crate::error::Result;
+use crate::geometry::{Bounds, Hit, Key, PreparedRay, TriangleMesh};
+use crate::progress::Progress;
+
+/// Calls the macro `$callback!` with `{ $arguments }` and then, per structure, `Type "name" "description";`.
+///
+/// This is the one list of structures: [`Kind`] and [`dispatch_kind!`](crate::dispatch_kind) are made from it.
+#[macro_export]
+macro_rules! for_each_accelerator {
+    ($($callback:tt)::+ { $($arguments:tt)* }) => {
+        $($callback)::+! {
+            { $($arguments)* }
+            Linear "linear" "Every triangle, no tree: the reference.";
+            Bvh2 "bvh2" "Binary tree.";
+            CwBvh "cwbvh" "Compressed 8-wide tree: the least memory.";
+        }
+    };
+}
+
+/// Evaluates an expression with a type name bound to the structure of a [`Kind`], `Auto` resolved.
+///
+/// ```
+/// use whitted::accel::{Kind, TriangleAccelerator};
+/// assert_eq!(whitted::dispatch_kind!(Kind::CwBvh, A => A::NAME), "cwbvh");
+/// ```
+#[macro_export]
+macro_rules! dispatch_kind {
+    ({ @list ($kind:expr) $accelerator:ident $body:block } $($name:ident $text:literal $description:literal;)+) => {
+        match $crate::accel::Kind::resolve($kind) {
+            $($crate::accel::Kind::$name => {
+                type $accelerator = $crate::accel::$name;
+                $body
+            })+
+            $crate::accel::Kind::Auto => unreachable!("resolve never returns Auto"),
+        }
+    };
+    ($kind:expr, $accelerator:ident => $body:expr) => {
+        $crate::for_each_accelerator!($crate::dispatch_kind { @list ($kind) $accelerator { $body } })
+    };
+}
+pub use crate::dispatch_kind;
+
+macro_rules! define_kind {
+    ({} $($name:ident $text:literal $description:literal;)+) => {
+        /// Which acceleration structure to use for triangles.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Serialize, serde::Deserialize)]
+        #[serde(rename_all = "lowercase")]
+        pub enum Kind {
+            /// The fastest one.
+            #[default]
+            Auto,
+            $(#[doc = $description] $name,)+
+        }
+
+        impl Kind {
+            /// Every structure, without `Auto`; the reference comes first.
+            pub const ALL: &[Self] = &[$(Self::$name),+];
+
+            /// What the structure is called on the command line and in reports.
+            pub fn name(self) -> &'static str {
+                match self {
+                    Self::Auto => "auto",
+                    $(Self::$name => $text,)+
+                }
+            }
+
+            /// One line about the structure.
+            pub fn description(self) -> &'static str {
+                match self {
+                    Self::Auto => "The fastest one.",
+                    $(Self::$name => $description,)+
+                }
+            }
+        }
+    };
+}
+for_each_accelerator!(define_kind {});
+
+impl Kind {
+    /// The structure itself: `Auto` becomes the one that measures fastest.
+    pub fn resolve(self) -> Self {
+        if self == Self::Auto { Self::Bvh2 } else { self }
+    }
 }
 
 /// How much time a build may take for faster rays.
@@ -28,6 +131,11 @@ pub enum Preset {
     Best,
 }
 
+impl Preset {
+    /// Every preset, quickest build first.
+    pub const ALL: &[Self] = &[Self::Fast, Self::Balanced, Self::Best];
+}
+
 /// How to build acceleration structures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Params {
@@ -35,4 +143,60 @@ pub struct Params {
     pub kind: Kind,
     /// How much time the build may take.
     pub preset: Preset,
+}
+
+/// A bottom-level structure over one mesh's triangles that owns its leaf layout.
+///
+/// Callers are generic over it and match the [`Kind`] once per batch. All implementations return the same bits. Rays
+/// are in the mesh's space; triangles that the mesh dropped are never hit; an empty mesh is valid.
+pub trait TriangleAccelerator: Sized + Send + Sync {
+    /// What the structure is called on the command line and in reports.
+    const NAME: &'static str;
+
+    /// Builds the structure over the mesh's live triangles. The mesh is not needed afterwards.
+    ///
+    /// # Errors
+    /// When `progress` says to stop.
+    fn build(mesh: &TriangleMesh, params: &Params, progress: &dyn Progress) -> Result<Self>;
+
+    /// Replaces `best` by the ray's first hit in the order of [`Key`]s if that comes before it.
+    ///
+    /// `instance` is the number to put into hits.
+    fn closest(&self, ray: &PreparedRay, instance: u32, best: &mut Hit);
+
+    /// Whether the ray has any hit at all.
+    fn occluded(&self, ray: &PreparedRay) -> bool;
+
+    /// Replaces `best` by the ray's first hit strictly after `key` if that comes before it.
+    fn next_after(&self, ray: &PreparedRay, instance: u32, key: Key, best: &mut Hit);
+
+    /// [`closest`](Self::closest) for each ray and the hit at the same position; the slices have equal lengths.
+    fn closest_batch(&self, rays: &[PreparedRay], instance: u32, best: &mut [Hit]) {
+        debug_assert_eq!(rays.len(), best.len());
+        for (ray, best) in rays.iter().zip(best) {
+            self.closest(ray, instance, best);
+        }
+    }
+
+    /// Sets the flags of those rays that are [`occluded`](Self::occluded); the slices have equal lengths. Rays whose
+    /// flag is set already are left out.
+    fn occluded_batch(&self, rays: &[PreparedRay], occluded: &mut [bool]) {
+        debug_assert_eq!(rays.len(), occluded.len());
+        for (ray, occluded) in rays.iter().zip(occluded) {
+            *occluded = *occluded || self.occluded(ray);
+        }
+    }
+
+    /// Counts and sizes.
+    fn stats(&self) -> TreeStats;
+
+    /// Audits the structure: every node's box contains the boxes of its children and triangles exactly, as the
+    /// traversal sees them, and every triangle is in exactly one leaf.
+    ///
+    /// # Errors
+    /// A description of the first violation.
+    fn validate(&self) -> std::result::Result<(), String>;
+
+    /// The box around all triangles, exact; empty for an empty mesh.
+    fn bounds(&self) -> Bounds;
 }

@@ -136,10 +136,11 @@ impl PreparedRay {
 
     /// The smallest t at which something in this space can still give a hit at or after `t`, clamping considered.
     ///
-    /// Where the clip interval starts no earlier than `t`, hits before it are clamped up to it and count.
+    /// Where the clip interval starts no earlier than `t`, hits before it are clamped up to it and count, even those that
+    /// rounding puts before the origin.
     #[inline(always)]
     pub fn lower_bound(&self, t: f32) -> f32 {
-        if self.clip.near >= t { 0.0 } else { t }
+        if self.clip.near >= t { f32::NEG_INFINITY } else { t }
     }
 
     /// The largest t in this space that can still give a hit at or before `t`, clamping considered.
