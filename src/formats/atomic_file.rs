@@ -21,9 +21,7 @@ impl<T: Write + Seek> Sink for T {}
 pub fn write_atomically(path: &Path, write: impl FnOnce(&mut dyn Sink) -> Result<()>) -> Result<()> {
     let system = |cause| Error::system(path, cause);
     match fs::metadata(path) {
-        Ok(existing) if existing.is_dir() => {
-            return Err(Error::caller("is a folder").at_path(path).remedy("give the name of a file in it"));
-        }
+        Ok(existing) if existing.is_dir() => return Err(is_a_folder(path)),
         Ok(existing) if !existing.is_file() => {
             let mut content = Cursor::new(Vec::new());
             write(&mut content).map_err(|error| error.at_path(path))?;
@@ -35,6 +33,32 @@ pub fn write_atomically(path: &Path, write: impl FnOnce(&mut dyn Sink) -> Result
         }
         _ => {}
     }
+    let (target, temporary) = temporary_for(path)?;
+    let mut buffered = BufWriter::new(temporary);
+    write(&mut buffered).map_err(|error| error.at_path(path))?;
+    let temporary = buffered.into_inner().map_err(|failed| system(failed.into_error()))?;
+    temporary.persist(&target).map_err(|failed| system(failed.error))?;
+    Ok(())
+}
+
+/// Finds out whether [`write_atomically`] could write a file, without touching it.
+///
+/// # Errors
+/// A folder that is missing or cannot be written to, or that `path` is itself.
+pub fn check_writable(path: &Path) -> Result<()> {
+    match fs::metadata(path) {
+        Ok(existing) if existing.is_dir() => Err(is_a_folder(path)),
+        Ok(existing) if !existing.is_file() => Ok(()),
+        _ => temporary_for(path).map(drop),
+    }
+}
+
+fn is_a_folder(path: &Path) -> Error {
+    Error::caller("is a folder").at_path(path).remedy("give the name of a file in it")
+}
+
+/// Where a file really is, links followed, and a temporary file in the same folder.
+fn temporary_for(path: &Path) -> Result<(PathBuf, tempfile::NamedTempFile)> {
     let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
     let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let temporary = temporary_file(folder).map_err(|cause| match cause.kind() {
@@ -44,11 +68,7 @@ pub fn write_atomically(path: &Path, write: impl FnOnce(&mut dyn Sink) -> Result
         _ => Error::new(Fault::System, format!("cannot create a file in `{}`: {}", folder.display(), plain(&cause)))
             .at_path(path),
     })?;
-    let mut buffered = BufWriter::new(temporary);
-    write(&mut buffered).map_err(|error| error.at_path(path))?;
-    let temporary = buffered.into_inner().map_err(|failed| system(failed.into_error()))?;
-    temporary.persist(&target).map_err(|failed| system(failed.error))?;
-    Ok(())
+    Ok((target, temporary))
 }
 
 /// A temporary file whose permissions are those that the umask leaves of a normal file's, not the owner's alone.

@@ -1,0 +1,336 @@
+//! What can be said on the command line: one entry a flag, which feeds the parser, the help and the completions.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueHint};
+use clap_complete::Shell;
+
+use super::values::{self, Orbit, one_of};
+use crate::accel::{Kind, Params, Preset};
+use crate::formats::{LoadOptions, NormalMode, UpAxis};
+use crate::render::{AovKind, Crop, RenderSettings};
+use crate::scene::auto::View;
+use crate::scene::{Clamp, FilmSettings, Transfer};
+
+/// Mirrors seen in mirrors are followed no deeper, whatever is asked for.
+const DEEPEST: u32 = 1000;
+/// Samples a pixel beyond which nothing visible changes any more.
+const MOST_SAMPLES: u32 = 1 << 20;
+/// Far more threads than any machine has processors.
+const MOST_THREADS: u32 = 4096;
+
+/// Everything on the command line.
+#[derive(Debug, Parser)]
+#[command(name = "whitted", version, about = "A Whitted ray tracer for large triangle scenes and quadrics")]
+pub struct Arguments {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Render a scene file (.toml) or a model (.obj, .gltf, .glb) to a picture.
+    Render(Box<RenderArguments>),
+    /// Tell what a scene or model holds and needs, without rendering it.
+    Info(InfoArguments),
+    /// Print a shell's completion script to standard output.
+    Completions {
+        /// The shell.
+        shell: Shell,
+    },
+}
+
+/// Flags of `render`.
+#[derive(Debug, Args)]
+pub struct RenderArguments {
+    /// Scene file or model.
+    #[arg(value_hint = ValueHint::FilePath)]
+    pub input: PathBuf,
+
+    /// Picture to write: .png, .jpg, .exr, .hdr and others, by suffix; `-` streams a PNG to standard output.
+    /// Without it: the input's name with .png, in the current folder.
+    #[arg(short, long = "output", value_name = "OUT", value_hint = ValueHint::FilePath, help_heading = "Output")]
+    pub output: Option<PathBuf>,
+    /// Extra values a pixel, with commas between: layers of an .exr picture, else of `<stem>.aov.exr` beside it.
+    #[arg(long, value_name = "KINDS", value_delimiter = ',', value_parser = one_of(AOVS), help_heading = "Output")]
+    pub aov: Vec<AovKind>,
+    /// Also write the automatic camera, lights and film of a model as a scene file.
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath, help_heading = "Output")]
+    pub save_scene: Option<PathBuf>,
+    /// Also write rays, times and memory as JSON.
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath, help_heading = "Output")]
+    pub stats_json: Option<PathBuf>,
+    /// Refuse to replace a file that exists.
+    #[arg(long, help_heading = "Output")]
+    pub no_clobber: bool,
+    /// Print everything that was noted while reading, and the time of every stage, to standard error.
+    #[arg(long, help_heading = "Output")]
+    pub verbose: bool,
+    /// Print nothing but errors.
+    #[arg(long, conflicts_with = "verbose", help_heading = "Output")]
+    pub quiet: bool,
+
+    /// What the picture is like.
+    #[command(flatten)]
+    pub film: FilmArguments,
+    /// Where it is seen from.
+    #[command(flatten)]
+    pub camera: CameraArguments,
+    /// How the input is read.
+    #[command(flatten)]
+    pub load: LoadArguments,
+    /// How trees are built.
+    #[command(flatten)]
+    pub build: BuildArguments,
+}
+
+/// Flags that replace fields of the scene's film, or choose what of it is rendered.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Picture")]
+pub struct FilmArguments {
+    /// Width and height in pixels.
+    #[arg(long, value_name = "WxH", value_parser = values::size)]
+    pub size: Option<(u32, u32)>,
+    /// Samples a pixel; 1 is the pixel's centre.
+    #[arg(long, value_name = "N", value_parser = values::count(1..=MOST_SAMPLES))]
+    pub spp: Option<u32>,
+    /// How often a ray may be reflected or refracted, up to 1000; 0 is direct light alone.
+    #[arg(long, value_name = "N", value_parser = values::count(0..=DEEPEST))]
+    pub max_depth: Option<u32>,
+    /// Render this part alone: pixels from the top left corner, X1 and Y1 excluded.
+    #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = values::crop, allow_hyphen_values = true)]
+    pub crop: Option<Crop>,
+    /// How linear values become those of PNG and JPEG.
+    #[arg(long, value_name = "CURVE", value_parser = one_of(TRANSFERS))]
+    pub transfer: Option<Transfer>,
+    /// When colours are clamped to 1: after every shade (the seed's rule) or when they are written.
+    #[arg(long, value_name = "WHEN", value_parser = one_of(CLAMPS))]
+    pub clamp: Option<Clamp>,
+    /// Multiply the picture by 2 to this.
+    #[arg(long, value_name = "EV", value_parser = values::exposure, allow_hyphen_values = true)]
+    pub exposure: Option<f32>,
+}
+
+/// Flags that choose the camera.
+#[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = "Camera")]
+pub struct CameraArguments {
+    /// Use this camera of the input; `whitted info` lists them.
+    #[arg(long, value_name = "NAME", group = "viewpoint")]
+    pub camera: Option<String>,
+    /// Look at the whole scene from this side.
+    #[arg(long, value_name = "SIDE", value_parser = one_of(VIEWS), group = "viewpoint")]
+    pub view: Option<View>,
+    /// Look at the whole scene from this direction: degrees from the front towards the right, degrees up.
+    #[arg(long, value_name = "AZ,EL", value_parser = values::orbit, allow_hyphen_values = true, group = "viewpoint")]
+    pub orbit: Option<Orbit>,
+    /// Vertical field of view in degrees, for perspective cameras.
+    #[arg(long, value_name = "DEGREES", value_parser = values::field_of_view, allow_hyphen_values = true)]
+    pub fov: Option<f64>,
+}
+
+/// Flags for reading models.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Reading")]
+pub struct LoadArguments {
+    /// The axis of a model that points up.
+    #[arg(long, value_name = "AXIS", value_parser = one_of(UP_AXES), default_value = "y")]
+    pub up: UpAxis,
+    /// Shading normals: those of the file, none, or computed from the faces.
+    #[arg(long, value_name = "MODE", value_parser = one_of(NORMAL_MODES), default_value = "file")]
+    pub normals: NormalMode,
+}
+
+/// Flags for acceleration structures and threads. None of them changes a pixel.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Speed (the picture stays the same)")]
+pub struct BuildArguments {
+    /// Acceleration structure for triangles.
+    #[arg(long, value_name = "KIND", value_parser = one_of(ACCELERATORS), default_value = "auto")]
+    pub accelerator: Kind,
+    /// How much time its build may take for faster rays.
+    #[arg(long, value_name = "PRESET", value_parser = one_of(PRESETS), default_value = "balanced")]
+    pub preset: Preset,
+    /// Number of threads; 0 is one per processor.
+    #[arg(long, value_name = "N", value_parser = values::count(0..=MOST_THREADS), default_value_t = 0)]
+    pub threads: u32,
+}
+
+/// Flags of `info`.
+#[derive(Debug, Args)]
+pub struct InfoArguments {
+    /// Scene file or model.
+    #[arg(value_hint = ValueHint::FilePath)]
+    pub input: PathBuf,
+    /// Print one JSON object.
+    #[arg(long)]
+    pub json: bool,
+    /// Also build the acceleration structures and tell their size.
+    #[arg(long)]
+    pub tree: bool,
+    /// Also build the acceleration structures and check them.
+    #[arg(long)]
+    pub validate: bool,
+    /// How the input is read.
+    #[command(flatten)]
+    pub load: LoadArguments,
+    /// How trees are built.
+    #[command(flatten)]
+    pub build: BuildArguments,
+}
+
+const AOVS: &[(&str, AovKind)] = &[
+    ("depth", AovKind::Depth),
+    ("normal", AovKind::Normal),
+    ("position", AovKind::Position),
+    ("uv", AovKind::Uv),
+    ("id", AovKind::Id),
+    ("albedo", AovKind::Albedo),
+];
+const TRANSFERS: &[(&str, Transfer)] = &[("srgb", Transfer::Srgb), ("linear", Transfer::Linear)];
+const CLAMPS: &[(&str, Clamp)] = &[("shade", Clamp::Shade), ("output", Clamp::Output)];
+const VIEWS: &[(&str, View)] = &[
+    ("front", View::Front),
+    ("back", View::Back),
+    ("left", View::Left),
+    ("right", View::Right),
+    ("top", View::Top),
+    ("bottom", View::Bottom),
+    ("iso", View::Iso),
+];
+const UP_AXES: &[(&str, UpAxis)] = &[("y", UpAxis::Y), ("z", UpAxis::Z)];
+const NORMAL_MODES: &[(&str, NormalMode)] =
+    &[("file", NormalMode::File), ("flat", NormalMode::Flat), ("smooth", NormalMode::Smooth)];
+const ACCELERATORS: &[(&str, Kind)] =
+    &[("auto", Kind::Auto), ("linear", Kind::Linear), ("bvh2", Kind::Bvh2), ("cwbvh", Kind::CwBvh)];
+const PRESETS: &[(&str, Preset)] = &[("fast", Preset::Fast), ("balanced", Preset::Balanced), ("best", Preset::Best)];
+
+impl FilmArguments {
+    /// Replaces those fields that were given.
+    pub fn apply(&self, film: &mut FilmSettings) {
+        if let Some((width, height)) = self.size {
+            (film.width, film.height) = (width, height);
+        }
+        film.samples = self.spp.unwrap_or(film.samples);
+        film.max_depth = self.max_depth.unwrap_or(film.max_depth);
+        film.transfer = self.transfer.unwrap_or(film.transfer);
+        film.clamp = self.clamp.unwrap_or(film.clamp);
+        film.exposure = self.exposure.unwrap_or(film.exposure);
+    }
+}
+
+impl LoadArguments {
+    /// As the readers take them.
+    pub fn options(&self) -> LoadOptions {
+        LoadOptions { normals: self.normals, up: self.up }
+    }
+}
+
+impl BuildArguments {
+    /// As the builders take them.
+    pub fn params(&self) -> Params {
+        Params { kind: self.accelerator, preset: self.preset }
+    }
+}
+
+impl RenderArguments {
+    /// As the renderer takes them; a kind of extra values that was named twice counts once.
+    pub fn settings(&self) -> RenderSettings {
+        let aovs = AovKind::ALL.into_iter().filter(|kind| self.aov.contains(kind)).collect();
+        RenderSettings { threads: self.build.threads as usize, crop: self.film.crop, aovs }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    fn render(flags: &str) -> Result<Box<RenderArguments>, clap::Error> {
+        let words = ["whitted", "render", "in.obj"].into_iter().chain(flags.split_whitespace());
+        Arguments::try_parse_from(words).map(|arguments| match arguments.command {
+            Command::Render(render) => render,
+            _ => unreachable!(),
+        })
+    }
+
+    #[test]
+    fn the_parser_is_consistent() {
+        Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn given_flags_replace_fields_of_the_film_and_no_others() {
+        let scene = FilmSettings { samples: 9, exposure: 2.0, ..Default::default() };
+        let mut film = scene;
+        render("").unwrap().film.apply(&mut film);
+        assert_eq!(film, scene);
+        render("--size 7x5 --spp 4 --max-depth 0 --transfer linear --clamp shade --exposure -1")
+            .unwrap()
+            .film
+            .apply(&mut film);
+        let expected = FilmSettings {
+            width: 7,
+            height: 5,
+            samples: 4,
+            max_depth: 0,
+            clamp: Clamp::Shade,
+            transfer: Transfer::Linear,
+            exposure: -1.0,
+        };
+        assert_eq!(film, expected);
+    }
+
+    #[test]
+    fn extra_values_come_once_and_in_one_order() {
+        let settings = render("--aov normal,depth,normal --aov id").unwrap().settings();
+        assert_eq!(settings.aovs, [AovKind::Depth, AovKind::Normal, AovKind::Id]);
+    }
+
+    #[test]
+    fn tables_name_every_value_as_the_library_does() {
+        assert_eq!(AOVS.iter().map(|row| row.1).collect::<Vec<_>>(), AovKind::ALL);
+        assert!(AOVS.iter().all(|(name, kind)| *name == kind.name()));
+        let json = |value: &dyn Fn() -> serde_json::Result<String>| value().unwrap().trim_matches('"').to_string();
+        for (name, kind) in ACCELERATORS {
+            assert_eq!(json(&|| serde_json::to_string(kind)), *name);
+        }
+        for (name, preset) in PRESETS {
+            assert_eq!(json(&|| serde_json::to_string(preset)), *name);
+        }
+        for (name, clamp) in CLAMPS {
+            assert_eq!(json(&|| serde_json::to_string(clamp)), *name);
+        }
+        for (name, transfer) in TRANSFERS {
+            assert_eq!(json(&|| serde_json::to_string(transfer)), *name);
+        }
+    }
+
+    #[test]
+    fn only_one_camera_can_be_asked_for() {
+        assert!(render("--view left --fov 20").is_ok());
+        for both in ["--view left --orbit 1,2", "--camera a --view top", "--camera a --orbit 1,2"] {
+            assert_eq!(render(both).unwrap_err().kind(), clap::error::ErrorKind::ArgumentConflict, "{both}");
+        }
+    }
+
+    #[test]
+    fn the_manual_explains_every_flag() {
+        let page = include_str!("../manual/command_line.md");
+        for command in Arguments::command().get_subcommands() {
+            for flag in command.get_arguments().filter_map(|argument| argument.get_long()) {
+                assert!(page.contains(&format!("`--{flag}")), "--{flag} of {}", command.get_name());
+            }
+        }
+    }
+
+    #[test]
+    fn limits_are_told() {
+        for (flags, told) in [("--max-depth 1001", "1000"), ("--spp 0", "1.."), ("--accelerator kd", "bvh2")] {
+            let message = render(flags).unwrap_err().to_string();
+            assert!(message.contains(told), "{flags}: {message}");
+        }
+    }
+}

@@ -1,0 +1,325 @@
+//! `whitted info`: what a scene holds, needs and costs. Its JSON is documented in the manual's page on the command
+//! line, and stable: a change that breaks a reader raises `schema`.
+
+use std::path::Path;
+
+use glam::DVec3;
+use serde::Serialize;
+
+use super::arguments::InfoArguments;
+use super::stats_json::SCHEMA;
+use super::terminal::{self, Terminal};
+use super::{info_text, ledger};
+use crate::error::{Error, Result};
+use crate::formats::{self, Loaded, Treatment};
+use crate::geometry::TriangleMesh;
+use crate::geometry::mesh::{DroppedCounts, Materials};
+use crate::render::{BuildStats, Renderer};
+use crate::scene::needs::Needs;
+use crate::scene::{FilmSettings, LightKind, Scene, Shape};
+
+/// The whole document.
+#[derive(Debug, Serialize)]
+pub struct Info<'a> {
+    pub schema: u32,
+    pub input: &'a Path,
+    pub triangles: Triangles,
+    pub meshes: usize,
+    pub instances: usize,
+    pub quadrics: usize,
+    pub materials: Vec<String>,
+    pub textures: Vec<TextureInfo>,
+    pub lights: Vec<LightInfo>,
+    pub cameras: Vec<String>,
+    /// Name of the camera that `render` uses.
+    pub active_camera: Option<String>,
+    pub film: FilmSettings,
+    /// In the file's coordinates; null where there is nothing or nothing bounded.
+    pub bounds: Option<BoundsInfo>,
+    /// Where the renderer has its zero, in the file's coordinates.
+    pub origin: [f64; 3],
+    pub needs: Needs,
+    pub bytes: Bytes,
+    /// Geometry's bytes for each triangle in the meshes, dropped ones included; null without triangles.
+    pub bytes_per_triangle: Option<PerTriangle>,
+    pub ledger: Vec<LedgerEntry>,
+    /// Null unless `--tree` or `--validate` was given.
+    pub tree: Option<Tree>,
+}
+
+/// Numbers of triangles.
+#[derive(Debug, Serialize)]
+pub struct Triangles {
+    /// That can be hit, every mesh counted once.
+    pub unique: u64,
+    /// That can be hit, every instance counted.
+    pub instanced: u64,
+    /// That cannot be hit, by reason, every mesh counted once.
+    pub dropped: DroppedCounts,
+}
+
+/// One image.
+#[derive(Debug, Serialize)]
+pub struct TextureInfo {
+    pub name: String,
+    pub width: u32,
+    pub height: u32,
+}
+
+/// One light.
+#[derive(Debug, Serialize)]
+pub struct LightInfo {
+    pub name: String,
+    pub kind: &'static str,
+}
+
+/// A box.
+#[derive(Debug, Serialize)]
+pub struct BoundsInfo {
+    pub min: [f64; 3],
+    pub max: [f64; 3],
+}
+
+/// Bytes by part.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Bytes {
+    pub positions: u64,
+    pub indices: u64,
+    pub normals: u64,
+    pub uvs: u64,
+    /// Material numbers of triangles.
+    pub materials: u64,
+    pub textures: u64,
+}
+
+/// [`Bytes`] but for textures, over the number of triangles.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct PerTriangle {
+    pub positions: f64,
+    pub indices: f64,
+    pub normals: f64,
+    pub uvs: f64,
+    pub materials: f64,
+}
+
+/// One line of the loader's ledger.
+#[derive(Debug, Serialize)]
+pub struct LedgerEntry {
+    pub treatment: Treatment,
+    pub feature: String,
+    pub count: u64,
+}
+
+/// What building took.
+#[derive(Debug, Serialize)]
+pub struct Tree {
+    #[serde(flatten)]
+    pub stats: BuildStats,
+    /// Bytes of nodes and leaves for each triangle that can be hit, every mesh counted once; null without triangles.
+    pub bytes_per_triangle: Option<f64>,
+    /// Whether the trees were checked and found sound.
+    pub validated: bool,
+}
+
+/// Prints what a file holds.
+///
+/// # Errors
+/// When the file cannot be read, when its trees cannot be built, or when they are not sound.
+pub fn run(arguments: &InfoArguments) -> Result<()> {
+    let terminal = Terminal::new(false)?;
+    super::use_threads(arguments.build.threads)?;
+    let loaded = formats::open(&arguments.input, &arguments.load.options(), &terminal);
+    terminal.clear();
+    let loaded = loaded?;
+    ledger::report(&loaded.ledger, false);
+    let mut info = Info::of(&arguments.input, &loaded);
+    if arguments.tree || arguments.validate {
+        let renderer = Renderer::build(loaded.scene, &arguments.build.params(), &terminal);
+        terminal.clear();
+        info.tree = Some(Tree::of(&renderer?, arguments)?);
+    }
+    let text = if arguments.json {
+        serde_json::to_string_pretty(&info).expect("names and numbers have a JSON form") + "\n"
+    } else {
+        info_text::of(&info)
+    };
+    terminal::print(text.as_bytes())
+}
+
+impl<'a> Info<'a> {
+    /// Gathers everything but the tree.
+    pub fn of(input: &'a Path, loaded: &Loaded) -> Self {
+        let scene = &loaded.scene;
+        let mut dropped = DroppedCounts::default();
+        for counts in scene.meshes.iter().map(|mesh| mesh.dropped_counts) {
+            dropped.non_finite += counts.non_finite;
+            dropped.zero_area += counts.zero_area;
+            dropped.bad_index += counts.bad_index;
+        }
+        let bytes = Bytes::of(scene);
+        let all_triangles = scene.meshes.iter().map(TriangleMesh::triangle_count).sum();
+        let texture = |texture: &crate::scene::Texture| TextureInfo {
+            name: texture.name.clone(),
+            width: texture.width,
+            height: texture.height,
+        };
+        let light = |light: &crate::scene::Light| LightInfo { name: light.name.clone(), kind: light_kind(&light.kind) };
+        let entry =
+            |(treatment, feature, count): (_, &str, _)| LedgerEntry { treatment, feature: feature.into(), count };
+        Self {
+            schema: SCHEMA,
+            input,
+            triangles: Triangles { unique: live_triangles(scene), instanced: scene.instanced_triangles(), dropped },
+            meshes: scene.meshes.len(),
+            instances: scene.objects.len(),
+            quadrics: scene.quadrics.len(),
+            materials: scene.materials.iter().map(|material| material.name.clone()).collect(),
+            textures: scene.textures.iter().map(texture).collect(),
+            lights: scene.lights.iter().map(light).collect(),
+            cameras: scene.cameras.iter().map(|camera| camera.name.clone()).collect(),
+            active_camera: scene.cameras.get(scene.active_camera).map(|camera| camera.name.clone()),
+            film: scene.film,
+            bounds: bounds(scene),
+            origin: scene.origin.to_array(),
+            needs: Needs::of(scene),
+            bytes,
+            bytes_per_triangle: bytes.per_triangle(all_triangles),
+            ledger: loaded.ledger.entries().map(entry).collect(),
+            tree: None,
+        }
+    }
+}
+
+impl Bytes {
+    fn of(scene: &Scene) -> Self {
+        let mut bytes = Self::default();
+        for mesh in &scene.meshes {
+            bytes.positions += size_of_val(mesh.positions.as_slice()) as u64;
+            bytes.indices += size_of_val(mesh.indices.as_slice()) as u64;
+            bytes.normals += mesh.normals.as_ref().map_or(0, |normals| size_of_val(normals.as_slice())) as u64;
+            bytes.uvs += mesh.uvs.as_ref().map_or(0, |uvs| size_of_val(uvs.as_slice())) as u64;
+            if let Materials::PerTriangle(materials) = &mesh.materials {
+                bytes.materials += size_of_val(materials.as_slice()) as u64;
+            }
+        }
+        bytes.textures = scene.textures.iter().map(|texture| texture.bytes() as u64).sum();
+        bytes
+    }
+
+    fn per_triangle(&self, triangles: usize) -> Option<PerTriangle> {
+        let share = |bytes: u64| bytes as f64 / triangles as f64;
+        (triangles > 0).then(|| PerTriangle {
+            positions: share(self.positions),
+            indices: share(self.indices),
+            normals: share(self.normals),
+            uvs: share(self.uvs),
+            materials: share(self.materials),
+        })
+    }
+}
+
+impl Tree {
+    fn of(renderer: &Renderer, arguments: &InfoArguments) -> Result<Self> {
+        if arguments.validate {
+            renderer.validate().map_err(|flaw| {
+                Error::limit(format!("a tree is not sound: {flaw}"))
+                    .at_path(&arguments.input)
+                    .remedy("this is a fault of the program: please report it")
+            })?;
+        }
+        let stats = renderer.build_stats().clone();
+        let triangles = live_triangles(renderer.scene());
+        let bytes = (stats.node_bytes + stats.leaf_bytes) as f64;
+        let bytes_per_triangle = (triangles > 0).then(|| bytes / triangles as f64);
+        Ok(Self { stats, bytes_per_triangle, validated: arguments.validate })
+    }
+}
+
+/// Triangles that can be hit, every mesh counted once.
+fn live_triangles(scene: &Scene) -> u64 {
+    scene.meshes.iter().map(|mesh| mesh.live_count() as u64).sum()
+}
+
+fn light_kind(kind: &LightKind) -> &'static str {
+    match kind {
+        LightKind::Point { .. } => "point",
+        LightKind::Directional { .. } => "directional",
+        LightKind::Spot { .. } => "spot",
+    }
+}
+
+/// The box around every object's own box, in the file's coordinates: tight unless an object is turned or sheared.
+fn bounds(scene: &Scene) -> Option<BoundsInfo> {
+    let mesh_boxes: Vec<_> = scene.meshes.iter().map(TriangleMesh::bounds).collect();
+    let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for object in &scene.objects {
+        let (own, origin) = match object.shape {
+            Shape::Mesh(mesh) => (Some(mesh_boxes[mesh as usize]), scene.meshes[mesh as usize].origin),
+            Shape::Quadric(quadric) => (scene.quadrics[quadric as usize].bounds(), DVec3::ZERO),
+        };
+        for corner in own.filter(|own| !own.is_empty()).iter().flat_map(|own| own.corners()) {
+            let p = object.transform.transform_point3(origin + corner.as_dvec3());
+            (min, max) = (min.min(p), max.max(p));
+        }
+    }
+    min.cmple(max).all().then(|| BoundsInfo { min: min.to_array(), max: max.to_array() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::formats::Ledger;
+    use crate::geometry::shapes;
+    use crate::scene::{NamedCamera, Object, auto};
+    use glam::{DAffine3, Vec3};
+
+    /// One triangle far from zero, placed twice, with a second that has no area, and a sphere of radius 3.
+    fn loaded() -> Loaded {
+        let mesh = TriangleMesh {
+            origin: DVec3::new(100.0, 0.0, 0.0),
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
+            indices: vec![[0, 1, 2], [0, 1, 1]],
+            normals: Some(vec![Vec3::Z; 3]),
+            ..Default::default()
+        };
+        let object = |shape, transform| Object { name: String::new(), shape, transform, material: Some(0) };
+        let mut scene = Scene {
+            meshes: vec![mesh.finish().unwrap()],
+            quadrics: vec![shapes::sphere()],
+            objects: vec![
+                object(Shape::Mesh(0), DAffine3::IDENTITY),
+                object(Shape::Mesh(0), DAffine3::from_translation(DVec3::new(0.0, 0.0, 7.0))),
+                object(Shape::Quadric(0), DAffine3::from_scale(DVec3::splat(3.0))),
+            ],
+            ..Default::default()
+        };
+        let camera = auto::frame(&scene, 0.0, 0.0, 0.5);
+        scene.cameras.push(NamedCamera { name: "only".into(), camera });
+        Loaded { scene, ledger: Ledger::default() }
+    }
+
+    #[test]
+    fn instances_count_once_for_bytes_and_each_for_triangles() {
+        let loaded = loaded();
+        let info = Info::of(Path::new("a.obj"), &loaded);
+        assert_eq!((info.triangles.unique, info.triangles.instanced, info.triangles.dropped.zero_area), (1, 2, 1));
+        assert_eq!((info.meshes, info.instances, info.quadrics), (1, 3, 1));
+        let expected = Bytes { positions: 36, indices: 24, normals: 36, ..Default::default() };
+        assert_eq!(info.bytes, expected);
+        let share = info.bytes_per_triangle.unwrap();
+        assert_eq!((share.positions, share.indices, share.uvs), (18.0, 12.0, 0.0));
+    }
+
+    #[test]
+    fn bounds_are_those_of_the_file_and_of_every_instance() {
+        let bounds = bounds(&loaded().scene).unwrap();
+        assert_eq!((bounds.min, bounds.max), ([-3.0, -3.0, -3.0], [101.0, 3.0, 7.0]));
+    }
+
+    #[test]
+    fn an_empty_scene_has_no_bounds_and_no_share_of_bytes() {
+        let loaded = Loaded { scene: Scene::default(), ledger: Ledger::default() };
+        let info = Info::of(Path::new("a.obj"), &loaded);
+        assert!(info.bounds.is_none() && info.bytes_per_triangle.is_none() && info.active_camera.is_none());
+    }
+}

@@ -1,0 +1,193 @@
+//! What `whitted info` tells a person: one aligned table, a paragraph a subject.
+
+use super::info::{Info, PerTriangle, Tree};
+use super::ledger;
+use super::terminal::printable;
+
+/// Width of the column of names.
+const LABEL: usize = 22;
+
+/// The whole text.
+pub fn of(info: &Info<'_>) -> String {
+    let mut table = Table(String::new());
+    table.row("input", info.input.display());
+    contents(&mut table, info);
+    place(&mut table, info);
+    needs(&mut table, info);
+    memory(&mut table, info);
+    if let Some(tree) = &info.tree {
+        tree_rows(&mut table, tree);
+    }
+    if !info.ledger.is_empty() {
+        table.heading("read");
+        for entry in &info.ledger {
+            table.line(&ledger::line(entry.treatment, &entry.feature, entry.count));
+        }
+    }
+    table.0
+}
+
+fn contents(table: &mut Table, info: &Info<'_>) {
+    table.heading("contents");
+    let triangles = &info.triangles;
+    if triangles.instanced == triangles.unique {
+        table.row("triangles", triangles.unique);
+    } else {
+        table.row("triangles", format!("{}, {} with every instance", triangles.unique, triangles.instanced));
+    }
+    let dropped = triangles.dropped;
+    for (reason, count) in [
+        ("without area", dropped.zero_area),
+        ("not finite or too large", dropped.non_finite),
+        ("with a missing vertex", dropped.bad_index),
+    ] {
+        if count > 0 {
+            table.row("  dropped", format!("{count} {reason}"));
+        }
+    }
+    table.row("meshes", info.meshes);
+    table.row("quadrics", info.quadrics);
+    table.row("instances", info.instances);
+    table.list("materials", &info.materials);
+    let textures = info.textures.iter().map(|t| format!("{} ({}x{})", t.name, t.width, t.height));
+    table.list("textures", &textures.collect::<Vec<_>>());
+    let lights = info.lights.iter().map(|light| format!("{} ({})", light.name, light.kind));
+    table.list("lights", &lights.collect::<Vec<_>>());
+    let active = |name: &String| Some(name) == info.active_camera.as_ref();
+    let cameras = info.cameras.iter().map(|name| if active(name) { format!("{name} (used)") } else { name.clone() });
+    table.list("cameras", &cameras.collect::<Vec<_>>());
+}
+
+fn place(table: &mut Table, info: &Info<'_>) {
+    table.heading("place");
+    match &info.bounds {
+        Some(bounds) => {
+            table.row("least corner", point(bounds.min));
+            table.row("greatest corner", point(bounds.max));
+            let size = std::array::from_fn(|axis| bounds.max[axis] - bounds.min[axis]);
+            table.row("size", point(size));
+        }
+        None => table.row("size", "nothing that has an end"),
+    }
+    table.row("scene origin", point(info.origin));
+    let film = &info.film;
+    table.row("picture", format!("{}x{}, {} samples a pixel", film.width, film.height, film.samples));
+}
+
+fn needs(table: &mut Table, info: &Info<'_>) {
+    table.heading("needs");
+    let needs = serde_json::to_value(info.needs).expect("counts have a JSON form");
+    for (name, value) in needs.as_object().into_iter().flatten() {
+        let label = name.replace('_', " ");
+        match value {
+            serde_json::Value::Bool(true) => table.row(&label, "yes"),
+            serde_json::Value::Number(count) if count.as_u64() != Some(0) => table.row(&label, count),
+            _ => {}
+        }
+    }
+}
+
+fn memory(table: &mut Table, info: &Info<'_>) {
+    table.heading("memory");
+    let share = |part: fn(&PerTriangle) -> f64| info.bytes_per_triangle.as_ref().map(part);
+    for (part, bytes, share) in [
+        ("positions", info.bytes.positions, share(|p| p.positions)),
+        ("indices", info.bytes.indices, share(|p| p.indices)),
+        ("normals", info.bytes.normals, share(|p| p.normals)),
+        ("texture coordinates", info.bytes.uvs, share(|p| p.uvs)),
+        ("material numbers", info.bytes.materials, share(|p| p.materials)),
+        ("textures", info.bytes.textures, None),
+    ] {
+        if bytes > 0 {
+            table.bytes(part, bytes, share);
+        }
+    }
+}
+
+fn tree_rows(table: &mut Table, tree: &Tree) {
+    table.heading("tree");
+    let stats = &tree.stats;
+    table.row("accelerator", &stats.accelerator);
+    table.row("built in", format!("{:.3} s", stats.seconds));
+    table.row("nodes", format!("{}, {}", stats.nodes, readable(stats.node_bytes)));
+    table.row("leaves", format!("{}, {}", stats.leaves, readable(stats.leaf_bytes)));
+    table.row("top level", readable(stats.top_level_bytes));
+    table.row("greatest depth", stats.max_depth);
+    if let Some(share) = tree.bytes_per_triangle {
+        table.row("bytes a triangle", format!("{share:.1}"));
+    }
+    if tree.validated {
+        table.row("checked", "sound");
+    }
+}
+
+/// Lines with a column of names.
+struct Table(String);
+
+impl Table {
+    fn heading(&mut self, name: &str) {
+        self.0.push('\n');
+        self.line(name);
+    }
+
+    fn line(&mut self, text: &str) {
+        self.0.push_str(&printable(text));
+        self.0.push('\n');
+    }
+
+    fn row(&mut self, label: &str, value: impl std::fmt::Display) {
+        self.line(&format!("  {label:LABEL$} {value}"));
+    }
+
+    /// A number of things, and one name a line below it.
+    fn list(&mut self, label: &str, names: &[String]) {
+        self.row(label, names.len());
+        for name in names {
+            self.line(&format!("  {:LABEL$}   {name}", ""));
+        }
+    }
+
+    fn bytes(&mut self, label: &str, bytes: u64, share: Option<f64>) {
+        let share = share.map_or(String::new(), |share| format!("  {share:6.1} bytes a triangle"));
+        self.row(label, format!("{:>10}{share}", readable(bytes)));
+    }
+}
+
+fn point([x, y, z]: [f64; 3]) -> String {
+    format!("{x} {y} {z}")
+}
+
+/// A number of bytes with a unit of 1024s, to four digits.
+fn readable(bytes: u64) -> String {
+    const UNITS: [&str; 5] = ["B", "KiB", "MiB", "GiB", "TiB"];
+    let mut value = bytes as f64;
+    let mut unit = 0;
+    while value >= 1024.0 && unit + 1 < UNITS.len() {
+        value /= 1024.0;
+        unit += 1;
+    }
+    if unit == 0 { format!("{bytes} B") } else { format!("{value:.1} {}", UNITS[unit]) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_are_readable() {
+        assert_eq!(readable(0), "0 B");
+        assert_eq!(readable(1023), "1023 B");
+        assert_eq!(readable(1536), "1.5 KiB");
+        assert_eq!(readable(3 << 30), "3.0 GiB");
+        assert_eq!(readable(u64::MAX), "16777216.0 TiB");
+    }
+
+    #[test]
+    fn columns_are_aligned() {
+        let mut table = Table(String::new());
+        table.row("a", 1);
+        table.list("names", &["x".into()]);
+        let columns: Vec<_> = table.0.lines().map(|line| line.find(['1', 'x']).unwrap()).collect();
+        assert_eq!(columns, [3 + LABEL, 3 + LABEL, 5 + LABEL]);
+    }
+}

@@ -1,0 +1,76 @@
+//! The command line: arguments, one file a subcommand, and what they share.
+//!
+//! Results go to standard output, everything else to standard error. The library below never prints, reads arguments
+//! or exits. The manual page is [`crate::manual::command_line`].
+
+pub mod arguments;
+mod camera;
+mod completions;
+mod info;
+mod info_text;
+mod ledger;
+mod outputs;
+mod render;
+mod stats_json;
+mod terminal;
+mod values;
+
+use std::process::ExitCode;
+
+pub use arguments::Arguments;
+
+use crate::error::{Error, Fault, Result};
+use arguments::Command;
+
+/// Exit code of a command that failed.
+const FAILED: u8 = 1;
+/// Exit code of a command that was interrupted: 128 and the number of SIGINT, as shells have it.
+const INTERRUPTED: u8 = 130;
+
+/// Runs a subcommand.
+///
+/// # Errors
+/// Whatever stopped it; [`Fault::Cancelled`] after an interrupt.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    match &arguments.command {
+        Command::Render(arguments) => render::run(arguments),
+        Command::Info(arguments) => info::run(arguments),
+        Command::Completions { shell } => completions::run(*shell),
+    }
+}
+
+/// Reports an error in one line on standard error and says what the process ends with: 0, 1 or 130.
+pub fn exit_code(result: Result<()>) -> ExitCode {
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) if error.fault() == Fault::Cancelled => ExitCode::from(INTERRUPTED),
+        Err(error) => {
+            terminal::report(&format!("error: {}", one_line(&error)));
+            ExitCode::from(FAILED)
+        }
+    }
+}
+
+/// Limits every parallel step to this many threads; 0 is one per processor.
+fn use_threads(threads: u32) -> Result<()> {
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads as usize)
+        .build_global()
+        .map_err(|error| Error::limit(format!("{threads} threads cannot be started: {error}")).remedy("ask for fewer"))
+}
+
+/// The error's text on one line, whatever a parser put into its message.
+fn one_line(error: &Error) -> String {
+    error.to_string().lines().map(str::trim).filter(|line| !line.is_empty()).collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_of_several_lines_is_reported_on_one() {
+        let error = Error::file("expected a value\n  found `]`").remedy("give one");
+        assert_eq!(one_line(&error), "expected a value found `]`; give one");
+    }
+}

@@ -1,0 +1,242 @@
+//! The files that a rendering writes: named, checked and protected before anything is rendered.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::arguments::RenderArguments;
+use crate::error::{Error, Result};
+use crate::formats::atomic_file::{check_writable, write_atomically};
+use crate::formats::picture::PictureFormat;
+
+/// Where the picture goes.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Picture {
+    /// As a PNG to standard output.
+    Stdout,
+    /// To a file, in the format of its suffix.
+    File(PathBuf),
+}
+
+impl Picture {
+    /// The file, if it is one.
+    pub fn path(&self) -> Option<&Path> {
+        match self {
+            Self::Stdout => None,
+            Self::File(path) => Some(path),
+        }
+    }
+}
+
+/// Every file that a rendering may write.
+#[derive(Debug)]
+pub struct Outputs {
+    /// The picture.
+    pub picture: Picture,
+    /// Extra values, where the picture's own file cannot hold them.
+    pub aov_file: Option<PathBuf>,
+    /// What was finished of an interrupted picture.
+    pub partial: Option<PathBuf>,
+    /// The scene that was chosen for a model.
+    pub scene: Option<PathBuf>,
+    /// Rays, times and memory.
+    pub stats: Option<PathBuf>,
+}
+
+impl Outputs {
+    /// Names the files and finds out what would stop them from being written.
+    ///
+    /// # Errors
+    /// A picture whose suffix names no format; a file that is the input, that exists and must not be replaced, that is
+    /// named twice, or whose folder is missing or cannot be written to.
+    pub fn plan(arguments: &RenderArguments) -> Result<Self> {
+        let picture = match &arguments.output {
+            Some(path) if path.as_os_str() == "-" => Picture::Stdout,
+            Some(path) => {
+                PictureFormat::of(path)?;
+                Picture::File(path.clone())
+            }
+            None => Picture::File(default_picture(&arguments.input)?),
+        };
+        let (aov_file, partial) = match &picture {
+            Picture::File(path) => {
+                let apart = !arguments.aov.is_empty() && !PictureFormat::of(path)?.has_layers();
+                (apart.then(|| path.with_extension("aov.exr")), Some(path.with_extension("partial.png")))
+            }
+            Picture::Stdout if arguments.aov.is_empty() => (None, None),
+            Picture::Stdout => {
+                return Err(Error::caller("extra values have no file to go to when the picture is streamed")
+                    .remedy("name a file with -o, or leave out --aov"));
+            }
+        };
+        let outputs = Self {
+            picture,
+            aov_file,
+            partial,
+            scene: arguments.save_scene.clone(),
+            stats: arguments.stats_json.clone(),
+        };
+        outputs.refuse_inputs([arguments.input.as_path()])?;
+        outputs.check(arguments.no_clobber)?;
+        Ok(outputs)
+    }
+
+    /// Refuses to write over any of the files that were read.
+    ///
+    /// # Errors
+    /// Names the first output that is an input.
+    pub fn refuse_inputs<'a>(&self, inputs: impl IntoIterator<Item = &'a Path>) -> Result<()> {
+        let inputs: Vec<PathBuf> = inputs.into_iter().filter_map(identity).collect();
+        for path in self.files().chain(self.partial.as_deref()) {
+            if identity(path).is_some_and(|path| inputs.contains(&path)) {
+                return Err(Error::caller("the picture is made from this file, so it is not overwritten")
+                    .at_path(path)
+                    .remedy("name another file to write"));
+            }
+        }
+        Ok(())
+    }
+
+    /// The files that a finished rendering writes.
+    fn files(&self) -> impl Iterator<Item = &Path> {
+        [self.picture.path(), self.aov_file.as_deref(), self.scene.as_deref(), self.stats.as_deref()]
+            .into_iter()
+            .flatten()
+    }
+
+    fn check(&self, no_clobber: bool) -> Result<()> {
+        let mut taken = Vec::new();
+        for path in self.files() {
+            // What is no regular file (a device, a pipe) is written to, not replaced.
+            if no_clobber && path.is_file() {
+                return Err(Error::caller("the file exists and --no-clobber was given")
+                    .at_path(path)
+                    .remedy("name another file, or leave out --no-clobber"));
+            }
+            check_writable(path)?;
+            let identity = identity(path);
+            if taken.contains(&identity) {
+                return Err(Error::caller("two outputs would go to this file")
+                    .at_path(path)
+                    .remedy("name another file"));
+            }
+            taken.push(identity);
+        }
+        Ok(())
+    }
+}
+
+/// Writes a text file whole or not at all.
+///
+/// # Errors
+/// When the operating system refuses.
+pub fn write_text(path: &Path, text: &str) -> Result<()> {
+    write_atomically(path, |file| file.write_all(text.as_bytes()).map_err(|cause| Error::system(path, cause)))
+}
+
+/// The input's name with `.png`, in the current folder.
+fn default_picture(input: &Path) -> Result<PathBuf> {
+    let stem = input.file_stem().ok_or_else(|| {
+        Error::caller("this is no file")
+            .at_path(input)
+            .remedy("give a scene file (.toml) or a model (.obj, .gltf, .glb)")
+    })?;
+    let mut name = stem.to_os_string();
+    name.push(".png");
+    Ok(name.into())
+}
+
+/// One name for every way to write a path, whether the file exists or not; `None` if its folder does not.
+fn identity(path: &Path) -> Option<PathBuf> {
+    let in_folder = || {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        Some(fs::canonicalize(folder).ok()?.join(path.file_name()?))
+    };
+    fs::canonicalize(path).ok().or_else(in_folder)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::arguments::{Arguments, Command};
+    use clap::Parser;
+
+    fn plan(input: &Path, flags: &[&str]) -> Result<Outputs> {
+        let words = ["whitted", "render", input.to_str().unwrap()].into_iter().chain(flags.iter().copied());
+        match Arguments::try_parse_from(words).unwrap().command {
+            Command::Render(arguments) => Outputs::plan(&arguments),
+            _ => unreachable!(),
+        }
+    }
+
+    /// A folder with a file `in.obj`.
+    fn folder_with_input() -> (tempfile::TempDir, PathBuf) {
+        let folder = tempfile::tempdir().unwrap();
+        let input = folder.path().join("in.obj");
+        fs::write(&input, "v 0 0 0\n").unwrap();
+        (folder, input)
+    }
+
+    #[test]
+    fn files_are_named_after_the_picture() {
+        let (folder, input) = folder_with_input();
+        let out = folder.path().join("a.b.jpg");
+        let outputs = plan(&input, &["-o", out.to_str().unwrap(), "--aov", "depth"]).unwrap();
+        assert_eq!(outputs.aov_file, Some(folder.path().join("a.b.aov.exr")));
+        assert_eq!(outputs.partial, Some(folder.path().join("a.b.partial.png")));
+        let layered = folder.path().join("a.EXR");
+        let outputs = plan(&input, &["-o", layered.to_str().unwrap(), "--aov", "depth"]).unwrap();
+        assert_eq!((outputs.picture, outputs.aov_file), (Picture::File(layered), None));
+        assert_eq!(default_picture(Path::new("models/duck.v2.glb")).unwrap(), Path::new("duck.v2.png"));
+        assert!(default_picture(Path::new("..")).is_err());
+    }
+
+    #[test]
+    fn the_input_is_recognised_by_any_of_its_names() {
+        let (folder, input) = folder_with_input();
+        let detour = folder.path().join(".").join("in.obj");
+        for flag in ["--stats-json", "--save-scene"] {
+            let error = plan(&input, &[flag, detour.to_str().unwrap()]).unwrap_err();
+            assert!(error.message().contains("made from this file"), "{flag}: {error}");
+        }
+        #[cfg(unix)]
+        {
+            let link = folder.path().join("link.png");
+            std::os::unix::fs::symlink(&input, &link).unwrap();
+            assert!(plan(&input, &["-o", link.to_str().unwrap()]).is_err());
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_written_is_found_out_at_once() {
+        let (folder, input) = folder_with_input();
+        let place = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
+        let error = plan(&input, &["-o", &place("missing/out.png")]).unwrap_err();
+        assert!(error.to_string().contains("create it first"), "{error}");
+        let named_like_a_picture = place("folder.png");
+        fs::create_dir(&named_like_a_picture).unwrap();
+        assert!(plan(&input, &["-o", &named_like_a_picture]).unwrap_err().message().contains("is a folder"));
+        assert!(plan(&input, &["-o", &place("out.gif")]).unwrap_err().message().contains("gif"));
+        let twice = plan(&input, &["-o", &place("out.png"), "--stats-json", &place("./out.png")]);
+        assert!(twice.unwrap_err().message().contains("two outputs"));
+        assert!(plan(&input, &["-o", "-", "--aov", "depth"]).is_err());
+    }
+
+    #[test]
+    fn existing_files_are_replaced_unless_that_is_refused() {
+        let (folder, input) = folder_with_input();
+        let out = folder.path().join("out.png");
+        let stats = folder.path().join("stats.json");
+        fs::write(&stats, "old").unwrap();
+        let flags = ["-o", out.to_str().unwrap(), "--stats-json", stats.to_str().unwrap()];
+        assert!(plan(&input, &flags).is_ok());
+        let refused = plan(&input, &[&flags[..], &["--no-clobber"]].concat()).unwrap_err();
+        assert!(refused.to_string().contains("stats.json") && refused.message().contains("exists"), "{refused}");
+    }
+
+    #[test]
+    fn planning_leaves_nothing_behind() {
+        let (folder, input) = folder_with_input();
+        plan(&input, &["-o", folder.path().join("out.png").to_str().unwrap()]).unwrap();
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+}

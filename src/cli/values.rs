@@ -1,0 +1,139 @@
+//! Values of flags: how they are written, and what is said of those that are not understood.
+
+use std::ops::RangeInclusive;
+use std::str::FromStr;
+
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+
+use crate::render::Crop;
+
+/// The longest side of a picture, in pixels.
+const LONGEST_SIDE: u32 = 65_536;
+
+/// Accepts one of the names of a table and gives what stands beside it.
+pub fn one_of<T: Copy + Send + Sync + 'static>(
+    table: &'static [(&'static str, T)],
+) -> impl TypedValueParser<Value = T> {
+    PossibleValuesParser::new(table.iter().map(|(name, _)| *name)).map(move |name| {
+        let (_, value) = table.iter().find(|(known, _)| *known == name).expect("clap accepts the table's names alone");
+        *value
+    })
+}
+
+/// Where an automatic camera stands, seen from the middle of the scene.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Orbit {
+    /// Radians from +Z towards +X.
+    pub azimuth: f64,
+    /// Radians above the horizon.
+    pub elevation: f64,
+}
+
+/// Reads `WIDTHxHEIGHT`.
+pub fn size(text: &str) -> Result<(u32, u32), String> {
+    let sides = text.split_once(['x', 'X']).and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
+    let (width, height) = sides.ok_or("expected WIDTHxHEIGHT in pixels, such as 1280x720")?;
+    let sane = 1..=LONGEST_SIDE;
+    if sane.contains(&width) && sane.contains(&height) {
+        Ok((width, height))
+    } else {
+        Err(format!("width and height must lie between 1 and {LONGEST_SIDE}"))
+    }
+}
+
+/// Reads `X0,Y0,X1,Y1`.
+pub fn crop(text: &str) -> Result<Crop, String> {
+    let [x0, y0, x1, y1] =
+        list(text).ok_or("expected X0,Y0,X1,Y1 in pixels from the top left corner, such as 0,0,320,240")?;
+    if x0 < x1 && y0 < y1 {
+        Ok(Crop { x0, y0, x1, y1 })
+    } else {
+        Err("nothing lies inside: X1 must be greater than X0 and Y1 greater than Y0".into())
+    }
+}
+
+/// Reads `AZIMUTH,ELEVATION` in degrees.
+pub fn orbit(text: &str) -> Result<Orbit, String> {
+    let [azimuth, elevation]: [f64; 2] = list(text).ok_or("expected AZIMUTH,ELEVATION in degrees, such as 30,20")?;
+    if !azimuth.is_finite() || !(-90.0..=90.0).contains(&elevation) {
+        return Err("the elevation must lie between -90 and 90 degrees".into());
+    }
+    Ok(Orbit { azimuth: azimuth.to_radians(), elevation: elevation.to_radians() })
+}
+
+/// Reads a vertical field of view in degrees and gives radians.
+pub fn field_of_view(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(degrees) if degrees > 0.0 && degrees < 180.0 => Ok(degrees.to_radians()),
+        _ => Err("expected degrees between 0 and 180, both excluded".into()),
+    }
+}
+
+/// Reads an exposure in stops.
+pub fn exposure(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(stops) if stops.abs() <= 100.0 => Ok(stops),
+        _ => Err("expected stops between -100 and 100; each doubles the light".into()),
+    }
+}
+
+/// Reads a whole number within a range.
+pub fn count(range: RangeInclusive<u32>) -> impl TypedValueParser<Value = u32> {
+    clap::value_parser!(u32).range(i64::from(*range.start())..=i64::from(*range.end()))
+}
+
+/// Reads exactly N numbers with commas between them.
+fn list<T: FromStr, const N: usize>(text: &str) -> Option<[T; N]> {
+    let values: Vec<T> = text.split(',').map(|value| value.trim().parse().ok()).collect::<Option<_>>()?;
+    values.try_into().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_are_read_and_bad_ones_explained() {
+        assert_eq!(size("1280x720"), Ok((1280, 720)));
+        assert_eq!(size("1X1"), Ok((1, 1)));
+        for bad in ["", "640", "640x", "x480", "640x480x3", "-1x5", "1.5x2", "640,480"] {
+            assert!(size(bad).unwrap_err().contains("1280x720"), "{bad}");
+        }
+        for bad in ["0x5", "5x0", "65537x1"] {
+            assert!(size(bad).unwrap_err().contains("between 1 and 65536"), "{bad}");
+        }
+    }
+
+    #[test]
+    fn crops_are_half_open_and_never_empty() {
+        assert_eq!(crop("1, 2,3,4"), Ok(Crop { x0: 1, y0: 2, x1: 3, y1: 4 }));
+        for bad in ["1,2,3", "1,2,3,4,5", "a,2,3,4", "-1,0,3,4", "0 0 1 1"] {
+            assert!(crop(bad).unwrap_err().contains("X0,Y0,X1,Y1"), "{bad}");
+        }
+        for empty in ["3,2,3,4", "1,4,3,4", "4,0,3,4"] {
+            assert!(crop(empty).unwrap_err().contains("nothing lies inside"), "{empty}");
+        }
+    }
+
+    #[test]
+    fn angles_become_radians() {
+        let quarter = orbit("-90,45").unwrap();
+        assert_eq!(quarter.azimuth, -std::f64::consts::FRAC_PI_2);
+        assert_eq!(quarter.elevation, std::f64::consts::FRAC_PI_4);
+        assert_eq!(field_of_view("90"), Ok(std::f64::consts::FRAC_PI_2));
+        for bad in ["91", "0,91", "0,-90.5", "nan,0", "0,nan", "inf,0"] {
+            assert!(orbit(bad).is_err(), "{bad}");
+        }
+        for bad in ["0", "180", "-5", "NaN", "wide"] {
+            assert!(field_of_view(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn exposures_are_finite() {
+        assert_eq!(exposure("-1.5"), Ok(-1.5));
+        for bad in ["inf", "nan", "101", "bright"] {
+            assert!(exposure(bad).is_err(), "{bad}");
+        }
+    }
+}

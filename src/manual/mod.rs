@@ -1,0 +1,9 @@
+//! The user's manual, one page a subject.
+
+/// Every flag, file and exit code.
+#[doc = include_str!("command_line.md")]
+pub mod command_line {}
+
+/// Coordinates, numbering, rays, hits and colours: what every part agrees on.
+#[doc = include_str!("conventions.md")]
+pub mod conventions {}
