@@ -3,6 +3,7 @@
 pub mod atomic_file;
 pub mod image_file;
 pub mod ledger;
+pub mod obj;
 pub mod picture;
 
 use std::path::Path;

@@ -1,0 +1,223 @@
+//! Material libraries: MTL files, cleaned line by line and then read by tobj.
+//!
+//! tobj gives up a whole file at the first value that it cannot read, without its line, and panics at a colour of
+//! fewer than three numbers. It gets only statements that it can read and that are used here; all others are
+//! written down with their lines.
+
+use std::collections::HashMap;
+use std::fs::File;
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+
+use super::find_file::find_file;
+use super::lines::{Lines, Statement};
+use crate::error::{Error, Result};
+use crate::formats::{Ledger, Treatment};
+
+/// The materials of all libraries that a file names.
+#[derive(Default)]
+pub(super) struct Libraries {
+    /// By name, with the folder of the library; the first definition counts.
+    materials: HashMap<String, (tobj::Material, PathBuf)>,
+    /// Whether a library could not be found or read: then names that are not defined are no news.
+    pub incomplete: bool,
+}
+
+impl Libraries {
+    /// Reads the libraries that `mtllib` statements name, relative to `folder`. What is wrong with them becomes
+    /// warnings: a picture in neutral colours is better than none.
+    pub fn read(folder: &Path, statements: &[(String, usize)], ledger: &mut Ledger) -> Self {
+        let mut libraries = Self::default();
+        for (names, line) in statements {
+            let names = names.replace("\\ ", " ");
+            let whole = find_file(folder, &names);
+            let pieces = if whole.is_some() { vec![names.as_str()] } else { split_names(&names) };
+            for name in pieces {
+                let Some(path) = find_file(folder, name) else {
+                    let warning = format!("material library `{name}` is missing (line {line}): neutral material used");
+                    ledger.note(Treatment::Warning, warning, 1);
+                    libraries.incomplete = true;
+                    continue;
+                };
+                if let Err(error) = libraries.read_file(&path, ledger) {
+                    ledger.note(Treatment::Warning, error.to_string(), 1);
+                    libraries.incomplete = true;
+                }
+            }
+        }
+        libraries
+    }
+
+    /// The material of this name, and the folder that its images are relative to.
+    pub fn get(&self, name: &str) -> Option<(&tobj::Material, &Path)> {
+        self.materials.get(name).map(|(material, folder)| (material, folder.as_path()))
+    }
+
+    fn read_file(&mut self, path: &Path, ledger: &mut Ledger) -> Result<()> {
+        let file = File::open(path).map_err(|cause| Error::system(path, cause))?;
+        let text = clean(path, BufReader::new(file), ledger)?;
+        let (materials, _) =
+            tobj::load_mtl_buf(&mut text.as_bytes()).map_err(|cause| Error::file(cause.to_string()).at_path(path))?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        for material in materials {
+            self.materials.entry(material.name.clone()).or_insert_with(|| (material, folder.to_path_buf()));
+        }
+        Ok(())
+    }
+}
+
+/// Several names in one statement: they end in `.mtl`, or else at white space.
+fn split_names(names: &str) -> Vec<&str> {
+    let lower = names.to_ascii_lowercase();
+    let ends: Vec<usize> = lower
+        .match_indices(".mtl")
+        .map(|(at, end)| at + end.len())
+        .filter(|&end| lower[end..].is_empty() || lower[end..].starts_with(|c: char| c.is_ascii_whitespace()))
+        .collect();
+    if ends.last() != Some(&names.len()) {
+        return names.split_ascii_whitespace().collect();
+    }
+    let starts = std::iter::once(0).chain(ends.iter().copied());
+    starts.zip(&ends).map(|(start, &end)| names[start..end].trim()).collect()
+}
+
+/// The statements that tobj shall read, each checked, in the spelling that it knows.
+fn clean(path: &Path, reader: impl BufRead, ledger: &mut Ledger) -> Result<String> {
+    let mut lines = Lines::new(path, reader);
+    let mut text = String::new();
+    while let Some(statement) = lines.read()? {
+        match clean_statement(statement) {
+            Ok(Cleaned::Use(keyword, value)) => {
+                text += &format!("{keyword} {value}\n");
+                if keyword != "newmtl" {
+                    ledger.note(Treatment::Honoured, format!("MTL {keyword}"), 1);
+                }
+            }
+            Ok(Cleaned::LeaveOut(feature)) => ledger.note(Treatment::Ignored, feature, 1),
+            Err(error) => {
+                let error = error.at_path(path).at_line(statement.line);
+                ledger.note(Treatment::Warning, format!("{error}: left out"), 1);
+            }
+        }
+    }
+    Ok(text)
+}
+
+enum Cleaned {
+    Use(&'static str, String),
+    LeaveOut(String),
+}
+
+fn clean_statement(Statement { keyword, rest, .. }: Statement<'_>) -> Result<Cleaned> {
+    let number = |keyword, word: Option<&str>| Ok(Cleaned::Use(keyword, finite(word)?.to_string()));
+    let first = rest.split_ascii_whitespace().next();
+    match keyword.to_ascii_lowercase().as_str() {
+        "newmtl" if rest.is_empty() => Err(Error::file("a material without a name")),
+        "newmtl" => Ok(Cleaned::Use("newmtl", rest.to_owned())),
+        "kd" => color("Kd", rest),
+        "ks" => color("Ks", rest),
+        "ke" => color("Ke", rest),
+        "tf" | "kt" => color("Tf", rest),
+        "ns" => number("Ns", first),
+        "ni" => number("Ni", first),
+        // `d -halo 0.5`: the number comes last.
+        "d" => number("d", rest.split_ascii_whitespace().next_back()),
+        "tr" => number("Tr", first),
+        "illum" => {
+            let model = finite(first)?;
+            if model.fract() != 0.0 || !(0.0..=10.0).contains(&model) {
+                return Err(Error::file(format!("`{model}` is not an illumination model from 0 to 10")));
+            }
+            Ok(Cleaned::Use("illum", model.to_string()))
+        }
+        "map_kd" if rest.is_empty() => Err(Error::file("map_Kd without a file")),
+        "map_kd" => Ok(Cleaned::Use("map_Kd", rest.to_owned())),
+        "ka" => Ok(Cleaned::LeaveOut("Ka: ambient comes from the scene".into())),
+        _ => Ok(Cleaned::LeaveOut(format!("MTL {}", keyword.chars().take(40).collect::<String>()))),
+    }
+}
+
+/// A colour of three numbers, or of one for all channels.
+fn color(keyword: &'static str, rest: &str) -> Result<Cleaned> {
+    let words: Vec<&str> = rest.split_ascii_whitespace().take(4).collect();
+    if let Some(kind @ ("spectral" | "xyz")) = words.first().copied() {
+        return Ok(Cleaned::LeaveOut(format!("MTL {keyword} {kind}")));
+    }
+    let channel = |i: usize| Ok(finite(words.get(i).copied())?.max(0.0));
+    let [r, g, b] = if words.len() == 1 { [channel(0)?; 3] } else { [channel(0)?, channel(1)?, channel(2)?] };
+    Ok(Cleaned::Use(keyword, format!("{r} {g} {b}")))
+}
+
+fn finite(word: Option<&str>) -> Result<f32> {
+    let word = word.ok_or_else(|| Error::file("a number is missing"))?;
+    word.parse()
+        .ok()
+        .filter(|x: &f32| x.is_finite())
+        .ok_or_else(|| Error::file(format!("`{}` is not a number", word.chars().take(40).collect::<String>())))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> (Libraries, Vec<String>) {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("a.mtl"), text).unwrap();
+        let mut ledger = Ledger::default();
+        let libraries = Libraries::read(folder.path(), &[("a.mtl".into(), 1)], &mut ledger);
+        let notes = ledger.entries().filter(|entry| entry.0 != Treatment::Honoured);
+        (libraries, notes.map(|(_, feature, _)| feature.replace(folder.path().to_str().unwrap(), "")).collect())
+    }
+
+    #[test]
+    fn values_are_read_in_every_spelling() {
+        let (libraries, notes) = read(
+            "newmtl a b\r\n\tKD 1 0.5 .25 # c\r\nKs 0.5\nNs 1e2\nd -halo 0.5\nillum 7\nTf 1 0 0\nmap_kd -s 2 2 a b.png\n",
+        );
+        assert_eq!(notes, [""; 0]);
+        let material = libraries.get("a b").unwrap().0;
+        assert_eq!(material.diffuse, Some([1.0, 0.5, 0.25]));
+        assert_eq!(material.specular, Some([0.5; 3]));
+        assert_eq!(material.shininess, Some(100.0));
+        assert_eq!(material.dissolve, Some(0.5));
+        assert_eq!(material.illumination_model, Some(7));
+        assert_eq!(material.unknown_param["Tf"], "1 0 0");
+        assert_eq!(material.diffuse_texture.as_deref(), Some("-s 2 2 a b.png"));
+    }
+
+    #[test]
+    fn trouble_is_a_warning_with_its_line_and_the_rest_is_read() {
+        let (libraries, notes) = read(
+            "newmtl a\nKd 1 0\nKs x 0 0\nillum 2.5\nNs nan\nnewmtl\nmap_Kd\nKa 1 1 1\nPr 1\nKe spectral a 1\nKd 1 1 1",
+        );
+        assert_eq!(libraries.get("a").unwrap().0.diffuse, Some([1.0; 3]));
+        assert_eq!(
+            notes,
+            [
+                "Ka: ambient comes from the scene",
+                "MTL Ke spectral",
+                "MTL Pr",
+                "/a.mtl:2: a number is missing: left out",
+                "/a.mtl:3: `x` is not a number: left out",
+                "/a.mtl:4: `2.5` is not an illumination model from 0 to 10: left out",
+                "/a.mtl:5: `nan` is not a number: left out",
+                "/a.mtl:6: a material without a name: left out",
+                "/a.mtl:7: map_Kd without a file: left out",
+            ]
+        );
+    }
+
+    #[test]
+    fn a_statement_may_name_several_libraries() {
+        assert_eq!(split_names("a b.mtl c.MTL"), ["a b.mtl", "c.MTL"]);
+        assert_eq!(split_names("a b.txt"), ["a", "b.txt"]);
+        assert_eq!(split_names("a.mtl.mtl"), ["a.mtl.mtl"]);
+        assert!(split_names("").is_empty());
+    }
+
+    #[test]
+    fn the_first_definition_counts() {
+        let (libraries, _) = read("newmtl a\nKd 1 1 1\nnewmtl a\nKd 0 0 0\n");
+        assert_eq!(libraries.get("a").unwrap().0.diffuse, Some([1.0; 3]));
+    }
+}

@@ -1,0 +1,128 @@
+//! Wavefront OBJ files and their material libraries.
+//!
+//! ```text
+//! lines -> parse -> triangulate, origin -> mesh
+//!       -> library (tobj) -> mtl -> textures
+//! ```
+//!
+//! A file is one mesh and one object, named after the file. Triangles are numbered in the order of the file, whatever
+//! groups and materials they belong to; a face of n corners is n - 2 of them. Positions are read in f64 and stored in
+//! f32 relative to one origin per file.
+//!
+//! # Why tobj reads the materials and not the faces
+//!
+//! tobj's answer is a list of models, one for each group and material, in f32. To get the mesh above from it a reader
+//! around it would have to read every face first: one index that is not in the file ends tobj's reading, and
+//! without a line; a corner that lacks a normal in a mesh that has some shifts the normals of all corners after it; and
+//! positions pass through f32. It also keeps 104 bytes a face and a `String` a line. What is left for it to do is to
+//! read again what was read already, so the statements are read here once. For libraries, where the cost does not
+//! matter and each value can be checked before tobj sees it, it does the reading: [`library`].
+
+mod find_file;
+mod library;
+mod lines;
+mod mesh;
+mod mtl;
+mod origin;
+mod parse;
+mod textures;
+mod triangulate;
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+use glam::{DAffine3, DMat3, DVec3};
+
+use crate::error::{Error, Result};
+use crate::formats::{Ledger, LoadOptions, Model, Treatment, UpAxis};
+use crate::progress::Progress;
+use crate::scene::{Material, Object, Shape};
+use library::Libraries;
+use lines::Lines;
+use parse::Parsed;
+use textures::Textures;
+
+/// Bytes between two reports of progress.
+const BYTES_PER_STEP: u64 = 1 << 20;
+
+/// Reads an OBJ file and the material libraries and images that it names.
+///
+/// Trouble with materials is written in the model's ledger and worked around with neutral ones. Progress counts
+/// bytes. Positions keep the file's units.
+///
+/// # Errors
+/// A system's error for a file that cannot be read; a file's error, with the line, for text that is not UTF-8, numbers
+/// that cannot be read and indices of 0; a file's error for a file without faces; a limit for more than 4294967294
+/// vertices or corners; cancellation.
+pub fn load(path: &Path, options: &LoadOptions, progress: &dyn Progress) -> Result<Model> {
+    let mut ledger = Ledger::default();
+    let mut parsed = read(path, progress)?;
+    parsed.finish(&mut ledger);
+    if parsed.faces.count == 0 {
+        return Err(Error::file("the file has no faces").remedy("export it with polygons").at_path(path));
+    }
+    let libraries = std::mem::take(&mut parsed.libraries);
+    let name = path.file_stem().map_or_else(|| "mesh".into(), |stem| stem.to_string_lossy());
+    let (mesh, material_names) =
+        mesh::build(parsed, &name, options.normals, progress).map_err(|error| error.at_path(path))?;
+
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let libraries = Libraries::read(folder, &libraries, &mut ledger);
+    let mut textures = Textures::default();
+    let materials = material_names.iter().map(|name| material(name.as_deref(), &libraries, &mut textures, &mut ledger));
+    let materials = materials.collect();
+    let transform = match options.up {
+        UpAxis::Y => DAffine3::IDENTITY,
+        UpAxis::Z => DAffine3::from_mat3(DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y)),
+    };
+    let object = Object { name: name.into_owned(), shape: Shape::Mesh(0), transform, material: None };
+    Ok(Model {
+        meshes: vec![mesh],
+        materials,
+        textures: textures.into_list(),
+        objects: vec![object],
+        ledger,
+        ..Default::default()
+    })
+}
+
+/// Reads all statements.
+fn read(path: &Path, progress: &dyn Progress) -> Result<Parsed> {
+    let system = |cause| Error::system(path, cause);
+    let file = File::open(path).map_err(system)?;
+    progress.begin("load", file.metadata().map_err(system)?.len());
+    let mut lines = Lines::new(path, BufReader::with_capacity(1 << 16, file));
+    let mut parsed = Parsed::default();
+    let mut reported = 0;
+    while let Some(statement) = lines.read()? {
+        let line = statement.line;
+        parsed.statement(statement).map_err(|error| error.at_path(path).at_line(line))?;
+        if lines.bytes() - reported >= BYTES_PER_STEP {
+            progress.advance(lines.bytes() - reported);
+            reported = lines.bytes();
+            progress.check()?;
+        }
+    }
+    progress.advance(lines.bytes() - reported);
+    Ok(parsed)
+}
+
+/// The material that `usemtl` calls by this name; a neutral one of that name if no library defines it.
+fn material(name: Option<&str>, libraries: &Libraries, textures: &mut Textures, ledger: &mut Ledger) -> Material {
+    let Some(name) = name.filter(|name| !name.is_empty()) else { return Material::default() };
+    let Some((source, folder)) = libraries.get(name) else {
+        if !libraries.incomplete {
+            let warning = format!("material `{name}` is not defined: neutral material used");
+            ledger.note(Treatment::Warning, warning, 1);
+        }
+        return Material { name: name.to_owned(), ..Default::default() };
+    };
+    let mut material = mtl::material(source, ledger);
+    material.diffuse_texture =
+        source.diffuse_texture.as_deref().and_then(|statement| textures.get(folder, statement, ledger));
+    material
+}
+
+#[cfg(test)]
+mod tests;
