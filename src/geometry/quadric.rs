@@ -116,6 +116,8 @@ pub struct QuadricPoint {
     pub position: DVec3,
     /// Unit normal, towards F > 0: outward for solids.
     pub normal: DVec3,
+    /// A bound on the distance of `position` from the true surface.
+    pub error: f64,
 }
 
 /// The quadratic `a s^2 + 2 b s + c` along a line, s counted from the closest approach at `t0`.
@@ -288,10 +290,10 @@ impl Quadric {
             position[axis] = plane;
             let mut normal = DVec3::ZERO;
             normal[axis] = if upper { 1.0 } else { -1.0 };
-            return QuadricPoint { position, normal };
+            return QuadricPoint { position, normal, error: rounding(origin, position) };
         }
         let Some(along) = self.along(origin, direction) else {
-            return QuadricPoint { position: origin, normal: against() };
+            return QuadricPoint { position: origin, normal: against(), error: rounding(origin, origin) };
         };
         let s = match (solve(along.a, along.b, along.c), surface) {
             (Roots::Two(_, s), 1) => s,
@@ -302,7 +304,12 @@ impl Quadric {
         };
         let local = along.start + direction * s;
         let normal = normalize(self.multiply(local) + self.linear).unwrap_or_else(against);
-        QuadricPoint { position: self.center + local, normal }
+        let position = self.center + local;
+        QuadricPoint {
+            position,
+            normal,
+            error: rounding(origin - self.center, local) + rounding(self.center, position),
+        }
     }
 
     /// Texture coordinates of a point found on `surface`.
@@ -430,6 +437,12 @@ impl Quadric {
             Bounds { min: round_down_vec(min), max: round_up_vec(max.max(min)) }
         })
     }
+}
+
+/// What the some thirty f64 operations between a line's origin and a point on it may have lost, and a second line that
+/// starts there may lose again: 64 roundings of the largest coordinate.
+fn rounding(origin: DVec3, position: DVec3) -> f64 {
+    64.0 * f64::EPSILON * origin.abs().max_element().max(position.abs().max_element())
 }
 
 /// Eigenvalues and unit eigenvectors of a symmetric 3x3 matrix (cyclic Jacobi, Golub and Van Loan 8.5).

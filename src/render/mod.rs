@@ -1,9 +1,24 @@
 //! From a scene to hits and pictures: the seed's call graph, one file a step.
+//!
+//! ```text
+//! ray_tracing -> trace -> intersect
+//!                  ^  \-> shade -> shadow -> intersect
+//!                  \--------/
+//! ```
 
 pub mod film;
+pub mod intersect;
+pub mod ray_tracing;
 pub mod renderer;
+pub mod sampling;
 pub mod settings;
+pub mod shade;
+pub mod shadow;
+pub mod surface;
+pub mod trace;
+pub mod world;
 
 pub use film::{Aov, AovKind, Film};
+pub use intersect::Intersect;
 pub use renderer::{BuildStats, Renderer};
 pub use settings::{Crop, RayCounts, RenderSettings, RenderStats};

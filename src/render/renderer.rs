@@ -1,17 +1,23 @@
 //! The public face: a scene built once, asked for hits and pictures.
 
-use crate::accel::Params;
+use std::time::Instant;
+
+use crate::accel::{Bvh2, CwBvh, Linear, Params};
 use crate::error::Result;
 use crate::geometry::{Hit, Key, Ray};
 use crate::progress::Progress;
 use crate::render::film::Film;
+use crate::render::intersect::{Intersect, TwoLevel};
+use crate::render::ray_tracing::ray_tracing;
 use crate::render::settings::RenderSettings;
+use crate::render::world::World;
 use crate::scene::Scene;
 
 /// A scene with its acceleration structures.
-#[derive(Debug)]
 pub struct Renderer {
     scene: Scene,
+    intersect: AnyTwoLevel,
+    stats: BuildStats,
 }
 
 /// What building took and how large it became.
@@ -35,14 +41,59 @@ pub struct BuildStats {
     pub max_depth: u32,
 }
 
+macro_rules! any_two_level {
+    ({} $($name:ident $text:literal $description:literal;)+) => {
+        /// A two-level structure over any kind of accelerator; the kind is matched once a call.
+        enum AnyTwoLevel {
+            $(#[doc = $description] $name(TwoLevel<$name>),)+
+        }
+
+        impl AnyTwoLevel {
+            fn build(scene: &Scene, params: &Params, progress: &dyn Progress) -> Result<Self> {
+                match params.kind.resolve() {
+                    $(crate::accel::Kind::$name => Ok(Self::$name(TwoLevel::build(scene, params, progress)?)),)+
+                    crate::accel::Kind::Auto => unreachable!("resolve never returns Auto"),
+                }
+            }
+        }
+
+        /// Evaluates an expression with the structure of whatever kind.
+        macro_rules! with_structure {
+            ($any:expr, $structure:ident => $body:expr) => {
+                match $any {
+                    $(AnyTwoLevel::$name($structure) => $body,)+
+                }
+            };
+        }
+    };
+}
+crate::for_each_accelerator!(any_two_level {});
+
 impl Renderer {
     /// Builds the acceleration structures of a scene.
     ///
     /// # Errors
-    /// A singular transform, a degenerate camera or light, or a cancellation.
+    /// A singular transform, or a cancellation.
     pub fn build(scene: Scene, params: &Params, progress: &dyn Progress) -> Result<Self> {
-        let _ = (params, progress);
-        Ok(Self { scene })
+        let start = Instant::now();
+        progress.begin("build", scene.meshes.iter().map(|mesh| mesh.live_count() as u64).sum());
+        let intersect = AnyTwoLevel::build(&scene, params, progress)?;
+        let mut stats = BuildStats {
+            accelerator: params.kind.resolve().name().into(),
+            seconds: start.elapsed().as_secs_f64(),
+            ..BuildStats::default()
+        };
+        with_structure!(&intersect, structure => {
+            for tree in structure.mesh_stats() {
+                stats.node_bytes += tree.node_bytes;
+                stats.leaf_bytes += tree.leaf_bytes;
+                stats.nodes += tree.nodes;
+                stats.leaves += tree.leaves;
+                stats.max_depth = stats.max_depth.max(tree.max_depth);
+            }
+            stats.top_level_bytes = structure.top_level_bytes() as u64;
+        });
+        Ok(Self { scene, intersect, stats })
     }
 
     /// The scene.
@@ -50,29 +101,40 @@ impl Renderer {
         &self.scene
     }
 
+    /// The objects as rays meet them.
+    pub fn world(&self) -> &World {
+        with_structure!(&self.intersect, structure => structure.world())
+    }
+
     /// The closest hit: the first in the order of [`Key`]. Rays are relative to the scene's origin.
-    pub fn closest(&self, _ray: &Ray) -> Hit {
-        todo!()
+    pub fn closest(&self, ray: &Ray) -> Hit {
+        with_structure!(&self.intersect, structure => structure.closest(ray))
     }
 
     /// Whether anything is hit, whatever its material.
-    pub fn occluded(&self, _ray: &Ray) -> bool {
-        todo!()
+    pub fn occluded(&self, ray: &Ray) -> bool {
+        with_structure!(&self.intersect, structure => structure.occluded(ray))
     }
 
-    /// The first hit after `key`.
-    pub fn next_after(&self, _ray: &Ray, _key: Key) -> Hit {
-        todo!()
+    /// The first hit after `key`; start from [`Key::BEFORE_ALL`] and go on from each hit's key to visit them all.
+    pub fn next_after(&self, ray: &Ray, key: Key) -> Hit {
+        with_structure!(&self.intersect, structure => structure.next_after(ray, key))
     }
 
-    /// [`closest`](Self::closest) for every ray of a slice; `hits` has the same length.
-    pub fn closest_batch(&self, _rays: &[Ray], _hits: &mut [Hit]) {
-        todo!()
+    /// [`closest`](Self::closest) for every ray of a slice.
+    ///
+    /// # Panics
+    /// If `hits` has another length than `rays`.
+    pub fn closest_batch(&self, rays: &[Ray], hits: &mut [Hit]) {
+        with_structure!(&self.intersect, structure => structure.closest_batch(rays, hits));
     }
 
-    /// [`occluded`](Self::occluded) for every ray of a slice; `occluded` has the same length.
-    pub fn occluded_batch(&self, _rays: &[Ray], _occluded: &mut [bool]) {
-        todo!()
+    /// [`occluded`](Self::occluded) for every ray of a slice.
+    ///
+    /// # Panics
+    /// If `occluded` has another length than `rays`.
+    pub fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool]) {
+        with_structure!(&self.intersect, structure => structure.occluded_batch(rays, occluded));
     }
 
     /// Renders the scene through its active camera.
@@ -81,13 +143,15 @@ impl Renderer {
     ///
     /// # Errors
     /// A degenerate camera, or a crop outside the picture.
-    pub fn render(&self, _settings: &RenderSettings, _progress: &dyn Progress) -> Result<Film> {
-        todo!()
+    pub fn render(&self, settings: &RenderSettings, progress: &dyn Progress) -> Result<Film> {
+        with_structure!(&self.intersect, structure => {
+            ray_tracing(&self.scene, structure.world(), structure, settings, progress)
+        })
     }
 
     /// What building took.
     pub fn build_stats(&self) -> &BuildStats {
-        todo!()
+        &self.stats
     }
 
     /// Checks every tree: each node's box contains its children's, every triangle is in exactly one leaf.
@@ -95,6 +159,6 @@ impl Renderer {
     /// # Errors
     /// Says what is wrong with the first tree that is.
     pub fn validate(&self) -> std::result::Result<(), String> {
-        todo!()
+        with_structure!(&self.intersect, structure => structure.validate())
     }
 }

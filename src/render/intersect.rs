@@ -1,0 +1,301 @@
+//! The two-level intersection: trees over triangles below, a tree over instances and bounded quadrics above,
+//! unbounded quadrics beside it. Here accelerators and scenes meet.
+
+use std::ops::ControlFlow;
+
+use crate::accel::{BoxTree, Kind, Params, TreeStats, TriangleAccelerator};
+use crate::error::Result;
+use crate::geometry::{Bounds, Hit, Key, PreparedRay, Quadric, Ray};
+use crate::progress::Progress;
+use crate::render::world::{Instance, World};
+use crate::scene::{Scene, Shape};
+
+/// Everything that a ray can ask of a scene. All implementations give the same answers, bit for bit.
+pub trait Intersect: Sync {
+    /// The first hit in the order of [`Key`].
+    fn closest(&self, ray: &Ray) -> Hit;
+
+    /// Whether anything is hit.
+    fn occluded(&self, ray: &Ray) -> bool;
+
+    /// Whether anything is hit that is known to be opaque as a whole.
+    fn occluded_by_opaque(&self, ray: &Ray) -> bool;
+
+    /// The first hit after `key`.
+    fn next_after(&self, ray: &Ray, key: Key) -> Hit;
+
+    /// The first hit after `key` on an instance that is not opaque as a whole.
+    fn next_transmissive_after(&self, ray: &Ray, key: Key) -> Hit;
+
+    /// [`closest`](Self::closest) for each ray.
+    ///
+    /// # Panics
+    /// If the slices have different lengths.
+    fn closest_batch(&self, rays: &[Ray], hits: &mut [Hit]) {
+        assert_eq!(rays.len(), hits.len(), "one hit a ray");
+        for (ray, hit) in rays.iter().zip(hits) {
+            *hit = self.closest(ray);
+        }
+    }
+
+    /// [`occluded`](Self::occluded) for each ray.
+    ///
+    /// # Panics
+    /// If the slices have different lengths.
+    fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool]) {
+        assert_eq!(rays.len(), occluded.len(), "one answer a ray");
+        for (ray, occluded) in rays.iter().zip(occluded) {
+            *occluded = self.occluded(ray);
+        }
+    }
+}
+
+/// A scene's instances over one kind of triangle accelerator.
+pub struct TwoLevel<A> {
+    meshes: Vec<A>,
+    quadrics: Vec<Quadric>,
+    world: World,
+    top: Top,
+}
+
+/// How instances are found.
+enum Top {
+    /// The scene is one untransformed mesh.
+    Single,
+    /// A tree over the bounded instances, and the numbers of the others.
+    Tree { tree: BoxTree, unbounded: Vec<u32> },
+    /// Every instance is asked: the reference.
+    Linear,
+}
+
+/// The instances' boxes; empty for those without end.
+fn boxes(instances: &[Instance]) -> Vec<Bounds> {
+    instances.iter().map(|instance| instance.bounds.unwrap_or(Bounds::EMPTY)).collect()
+}
+
+/// Which instances a search considers.
+trait Filter {
+    fn wants(instance: &Instance) -> bool;
+}
+
+struct Everything;
+struct Opaque;
+struct Transmissive;
+
+impl Filter for Everything {
+    fn wants(_: &Instance) -> bool {
+        true
+    }
+}
+
+impl Filter for Opaque {
+    fn wants(instance: &Instance) -> bool {
+        instance.opaque
+    }
+}
+
+impl Filter for Transmissive {
+    fn wants(instance: &Instance) -> bool {
+        !instance.opaque
+    }
+}
+
+impl<A: TriangleAccelerator> TwoLevel<A> {
+    /// Builds the trees of all meshes and the top level.
+    ///
+    /// # Errors
+    /// A singular transform, or a cancellation.
+    pub fn build(scene: &Scene, params: &Params, progress: &dyn Progress) -> Result<Self> {
+        let world = World::new(scene)?;
+        let instances = &world.instances;
+        let mut meshes = Vec::with_capacity(scene.meshes.len());
+        for mesh in &scene.meshes {
+            meshes.push(A::build(mesh, params, progress)?);
+            progress.advance(mesh.live_count() as u64);
+        }
+        let single = matches!(instances.as_slice(), [one] if one.identity && one.shape == Shape::Mesh(0));
+        let top = if single {
+            Top::Single
+        } else if params.kind.resolve() == Kind::Linear {
+            Top::Linear
+        } else {
+            let unbounded = (0..instances.len() as u32).filter(|&i| instances[i as usize].bounds.is_none()).collect();
+            Top::Tree { tree: BoxTree::build(&boxes(instances), params), unbounded }
+        };
+        Ok(Self { meshes, quadrics: scene.quadrics.clone(), world, top })
+    }
+
+    /// The objects as rays meet them.
+    pub fn world(&self) -> &World {
+        &self.world
+    }
+
+    /// Statistics of the meshes' trees.
+    pub fn mesh_stats(&self) -> impl Iterator<Item = TreeStats> + '_ {
+        self.meshes.iter().map(A::stats)
+    }
+
+    /// Bytes of the top level.
+    pub fn top_level_bytes(&self) -> usize {
+        let tree = match &self.top {
+            Top::Tree { tree, unbounded } => {
+                (tree.stats().node_bytes + tree.stats().leaf_bytes) as usize
+                    + std::mem::size_of_val(unbounded.as_slice())
+            }
+            Top::Single | Top::Linear => 0,
+        };
+        tree + std::mem::size_of_val(self.world.instances.as_slice())
+    }
+
+    /// Checks every tree.
+    ///
+    /// # Errors
+    /// Says what is wrong.
+    pub fn validate(&self) -> std::result::Result<(), String> {
+        for (number, mesh) in self.meshes.iter().enumerate() {
+            mesh.validate().map_err(|what| format!("mesh {number}: {what}"))?;
+        }
+        match &self.top {
+            Top::Tree { tree, .. } => {
+                tree.validate(&boxes(&self.world.instances)).map_err(|what| format!("top level: {what}"))
+            }
+            Top::Single | Top::Linear => Ok(()),
+        }
+    }
+
+    /// The first hit strictly after `after` on wanted instances.
+    fn search<F: Filter>(&self, ray: &PreparedRay, after: Option<Key>) -> Hit {
+        let mut best = Hit::MISS;
+        match &self.top {
+            Top::Single if F::wants(&self.world.instances[0]) => self.meet_mesh(0, 0, ray, after, &mut best),
+            Top::Single => {}
+            Top::Linear => {
+                for number in 0..self.world.instances.len() as u32 {
+                    self.meet::<F>(number, ray, after, &mut best);
+                }
+            }
+            Top::Tree { tree, unbounded } => {
+                for &number in unbounded {
+                    self.meet::<F>(number, ray, after, &mut best);
+                }
+                let near = after.map_or(ray.t_min, |key| if key.t > ray.t_min { key.t } else { ray.t_min });
+                let far = if best.t < ray.t_max { best.t } else { ray.t_max };
+                let _ = tree.traverse(ray, near, far, |number| {
+                    self.meet::<F>(number, ray, after, &mut best);
+                    ControlFlow::Continue(if best.t < ray.t_max { best.t } else { ray.t_max })
+                });
+            }
+        }
+        best
+    }
+
+    /// Improves `best` by what one instance has to offer.
+    #[inline]
+    fn meet<F: Filter>(&self, number: u32, ray: &PreparedRay, after: Option<Key>, best: &mut Hit) {
+        let instance = &self.world.instances[number as usize];
+        if !F::wants(instance) {
+            return;
+        }
+        let clip = instance.clip(ray);
+        // Every t of this instance will lie within the clip interval: nothing to gain if it starts after the best.
+        if clip.is_empty() || clip.near > best.t || clip.near > ray.t_max || clip.far < ray.t_min {
+            return;
+        }
+        match instance.shape {
+            Shape::Mesh(mesh) if instance.identity => self.meet_mesh(mesh, number, ray, after, best),
+            Shape::Mesh(mesh) => {
+                if let Some(local) = instance.local_ray(ray, clip) {
+                    self.meet_mesh(mesh, number, &local, after, best);
+                }
+            }
+            Shape::Quadric(quadric) => {
+                let (origin, direction) = instance.local_line(ray.origin.as_dvec3(), ray.direction.as_dvec3());
+                for crossing in self.quadrics[quadric as usize].intersect_quadratic(origin, direction).iter() {
+                    let t = clip.clamp(crossing.t as f32) + 0.0;
+                    let hit = Hit { t, u: 0.0, v: 0.0, instance: number, primitive: crossing.surface };
+                    let in_range = t >= ray.t_min && t <= ray.t_max && t < f32::INFINITY;
+                    if in_range && after.is_none_or(|key| key.is_before(&hit.key())) && hit.key().is_before(&best.key())
+                    {
+                        *best = hit;
+                    }
+                }
+            }
+        }
+    }
+
+    #[inline]
+    fn meet_mesh(&self, mesh: u32, number: u32, ray: &PreparedRay, after: Option<Key>, best: &mut Hit) {
+        let mesh = &self.meshes[mesh as usize];
+        match after {
+            None => mesh.closest(ray, number, best),
+            Some(key) => mesh.next_after(ray, number, key, best),
+        }
+    }
+
+    /// Whether any wanted instance is hit.
+    fn any<F: Filter>(&self, ray: &PreparedRay) -> bool {
+        match &self.top {
+            Top::Single => F::wants(&self.world.instances[0]) && self.meshes[0].occluded(ray),
+            Top::Linear => (0..self.world.instances.len() as u32).any(|number| self.blocks::<F>(number, ray)),
+            Top::Tree { tree, unbounded } => {
+                if unbounded.iter().any(|&number| self.blocks::<F>(number, ray)) {
+                    return true;
+                }
+                let mut blocked = false;
+                let _ = tree.traverse(ray, ray.t_min, ray.t_max, |number| {
+                    blocked = self.blocks::<F>(number, ray);
+                    if blocked { ControlFlow::Break(()) } else { ControlFlow::Continue(ray.t_max) }
+                });
+                blocked
+            }
+        }
+    }
+
+    /// Whether one instance is hit.
+    #[inline]
+    fn blocks<F: Filter>(&self, number: u32, ray: &PreparedRay) -> bool {
+        let instance = &self.world.instances[number as usize];
+        if !F::wants(instance) {
+            return false;
+        }
+        let clip = instance.clip(ray);
+        if clip.is_empty() || clip.near > ray.t_max || clip.far < ray.t_min {
+            return false;
+        }
+        match instance.shape {
+            Shape::Mesh(mesh) if instance.identity => self.meshes[mesh as usize].occluded(ray),
+            Shape::Mesh(mesh) => {
+                instance.local_ray(ray, clip).is_some_and(|local| self.meshes[mesh as usize].occluded(&local))
+            }
+            Shape::Quadric(quadric) => {
+                let (origin, direction) = instance.local_line(ray.origin.as_dvec3(), ray.direction.as_dvec3());
+                self.quadrics[quadric as usize].intersect_quadratic(origin, direction).iter().any(|crossing| {
+                    let t = clip.clamp(crossing.t as f32) + 0.0;
+                    t >= ray.t_min && t <= ray.t_max && t < f32::INFINITY
+                })
+            }
+        }
+    }
+}
+
+impl<A: TriangleAccelerator> Intersect for TwoLevel<A> {
+    fn closest(&self, ray: &Ray) -> Hit {
+        PreparedRay::new(ray).map_or(Hit::MISS, |ray| self.search::<Everything>(&ray, None))
+    }
+
+    fn occluded(&self, ray: &Ray) -> bool {
+        PreparedRay::new(ray).is_some_and(|ray| self.any::<Everything>(&ray))
+    }
+
+    fn occluded_by_opaque(&self, ray: &Ray) -> bool {
+        PreparedRay::new(ray).is_some_and(|ray| self.any::<Opaque>(&ray))
+    }
+
+    fn next_after(&self, ray: &Ray, key: Key) -> Hit {
+        PreparedRay::new(ray).map_or(Hit::MISS, |ray| self.search::<Everything>(&ray, Some(key)))
+    }
+
+    fn next_transmissive_after(&self, ray: &Ray, key: Key) -> Hit {
+        PreparedRay::new(ray).map_or(Hit::MISS, |ray| self.search::<Transmissive>(&ray, Some(key)))
+    }
+}

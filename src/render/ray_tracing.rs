@@ -1,0 +1,246 @@
+//! `RayTracing`: the frame loop, tile by tile.
+
+use glam::DVec2;
+use rayon::prelude::*;
+
+use crate::error::{Error, Result};
+use crate::geometry::Hit;
+use crate::progress::Progress;
+use crate::render::film::{Aov, AovKind, Film};
+use crate::render::intersect::Intersect;
+use crate::render::sampling;
+use crate::render::settings::{Crop, RayCounts, RenderSettings, RenderStats};
+use crate::render::surface::{SurfacePoint, texture_coordinates};
+use crate::render::trace::Tracer;
+use crate::render::world::World;
+use crate::scene::camera::{CameraRays, ViewRay};
+use crate::scene::{Background, Scene};
+
+/// Side of a tile in pixels: 32 x 32 pixels keep a thread busy for long enough and share well.
+const TILE: u32 = 32;
+
+/// Stack of a rendering thread: room for the deepest recursion that is allowed (a frame is well below 2 KiB).
+const STACK: usize = 16 << 20;
+
+/// The largest `max_depth` that [`ray_tracing`] accepts: what fits [`STACK`] with room to spare.
+pub const LARGEST_DEPTH: u32 = 1000;
+
+/// One tile's pixels, rows from the top.
+struct Tile {
+    area: Crop,
+    color: Vec<[f32; 3]>,
+    alpha: Vec<f32>,
+    aovs: Vec<Vec<f32>>,
+    counts: RayCounts,
+}
+
+/// Renders the scene through its active camera into a film.
+///
+/// The picture depends on the scene and its film settings alone. Cancelled work returns the tiles that are finished,
+/// with `complete` false.
+///
+/// # Errors
+/// A degenerate camera, a crop outside the picture, a depth beyond [`LARGEST_DEPTH`], or no thread to be had.
+#[doc(alias = "RayTracing")]
+pub fn ray_tracing<I: Intersect>(
+    scene: &Scene,
+    world: &World,
+    intersect: &I,
+    settings: &RenderSettings,
+    progress: &dyn Progress,
+) -> Result<Film> {
+    let film = &scene.film;
+    if film.width == 0 || film.height == 0 || film.samples == 0 {
+        return Err(Error::caller("the picture needs at least one pixel and one sample"));
+    }
+    if film.max_depth > LARGEST_DEPTH {
+        let depth = film.max_depth;
+        return Err(Error::limit(format!("a depth of {depth} is more than the {LARGEST_DEPTH} supported")));
+    }
+    let camera = scene.camera().rays(film.width, film.height, scene.origin)?;
+    let area = settings.crop.unwrap_or(Crop { x0: 0, y0: 0, x1: film.width, y1: film.height });
+    if !(area.x0 < area.x1 && area.y0 < area.y1 && area.x1 <= film.width && area.y1 <= film.height) {
+        return Err(Error::caller(format!(
+            "the crop {},{},{},{} does not lie within the {}x{} picture",
+            area.x0, area.y0, area.x1, area.y1, film.width, film.height
+        )));
+    }
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(settings.threads)
+        .stack_size(STACK)
+        .build()
+        .map_err(|cause| Error::limit(format!("cannot start {} threads: {cause}", settings.threads)))?;
+
+    let tiles = tiles_of(area);
+    progress.begin("render", tiles.len() as u64);
+    let start = std::time::Instant::now();
+    let render_tile = |&tile: &Crop| {
+        let tracer = Tracer::new(scene, world, intersect);
+        let finished = tile_pixels(&tracer, &camera, tile, &settings.aovs, progress)?;
+        progress.advance(1);
+        Some(finished)
+    };
+    let finished: Vec<Option<Tile>> = pool.install(|| tiles.par_iter().map(render_tile).collect());
+    let seconds = start.elapsed().as_secs_f64();
+
+    let (width, height) = (area.x1 - area.x0, area.y1 - area.y0);
+    let pixels = width as usize * height as usize;
+    let transparent = scene.background == Background::Transparent;
+    let mut picture = Film {
+        width,
+        height,
+        crop: settings.crop,
+        color: vec![[0.0; 3]; pixels],
+        alpha: transparent.then(|| vec![0.0; pixels]),
+        aovs: settings
+            .aovs
+            .iter()
+            .map(|&kind| Aov { kind, channels: vec![vec![0.0; pixels]; kind.channels().len()] })
+            .collect(),
+        settings: *film,
+        complete: finished.iter().all(Option::is_some),
+        stats: RenderStats { rays: RayCounts::default(), seconds, threads: pool.current_num_threads() },
+    };
+    for tile in finished.into_iter().flatten() {
+        picture.stats.rays += tile.counts;
+        copy_tile(&mut picture, area, &tile);
+    }
+    Ok(picture)
+}
+
+/// The tiles of an area, row by row. They lie on the grid of the full picture, so that a crop traces the same tiles.
+fn tiles_of(area: Crop) -> Vec<Crop> {
+    let mut tiles = Vec::new();
+    let first = |start: u32| start / TILE * TILE;
+    for y in (first(area.y0)..area.y1).step_by(TILE as usize) {
+        for x in (first(area.x0)..area.x1).step_by(TILE as usize) {
+            tiles.push(Crop {
+                x0: x.max(area.x0),
+                y0: y.max(area.y0),
+                x1: x.saturating_add(TILE).min(area.x1),
+                y1: y.saturating_add(TILE).min(area.y1),
+            });
+        }
+    }
+    tiles
+}
+
+/// Renders one tile; `None` once the work is cancelled.
+fn tile_pixels<I: Intersect>(
+    tracer: &Tracer<'_, I>,
+    camera: &CameraRays,
+    area: Crop,
+    aovs: &[AovKind],
+    progress: &dyn Progress,
+) -> Option<Tile> {
+    let pixels = ((area.x1 - area.x0) * (area.y1 - area.y0)) as usize;
+    let channels = aovs.iter().map(|kind| kind.channels().len()).sum();
+    let mut tile = Tile {
+        area,
+        color: Vec::with_capacity(pixels),
+        alpha: Vec::with_capacity(pixels),
+        aovs: vec![Vec::with_capacity(pixels); channels],
+        counts: RayCounts::default(),
+    };
+    let samples = tracer.scene.film.samples;
+    for y in area.y0..area.y1 {
+        if progress.is_cancelled() {
+            return None;
+        }
+        for x in area.x0..area.x1 {
+            // The mean of the samples, summed in f64 in their order.
+            let mut sum = [0.0f64; 3];
+            let mut covered = 0u32;
+            for sample in 0..samples {
+                let within = sampling::position(x, y, sample, samples);
+                let view = camera.ray(DVec2::new(f64::from(x), f64::from(y)) + within);
+                let (color, hit) = match view {
+                    Some(view) => tracer.trace_camera(view),
+                    None => (crate::scene::Rgb::ZERO, Hit::MISS),
+                };
+                for (sum, value) in sum.iter_mut().zip(color.to_array()) {
+                    *sum += f64::from(value);
+                }
+                covered += u32::from(hit.is_hit());
+                if sample == 0 && !aovs.is_empty() {
+                    record(tracer, view.as_ref(), &hit, aovs, &mut tile.aovs);
+                }
+            }
+            tile.color.push(sum.map(|sum| (sum / f64::from(samples)) as f32));
+            tile.alpha.push((f64::from(covered) / f64::from(samples)) as f32);
+        }
+    }
+    tile.counts = tracer.counts();
+    Some(tile)
+}
+
+/// Appends one pixel's extra values, channel by channel.
+fn record<I: Intersect>(
+    tracer: &Tracer<'_, I>,
+    view: Option<&ViewRay>,
+    hit: &Hit,
+    aovs: &[AovKind],
+    channels: &mut [Vec<f32>],
+) {
+    let found =
+        view.filter(|_| hit.is_hit()).map(|view| (view, SurfacePoint::of(tracer.scene, tracer.world, view, hit)));
+    let mut channels = channels.iter_mut();
+    for kind in aovs {
+        let values = match (&found, kind) {
+            (None, AovKind::Depth) => [f32::INFINITY, 0.0, 0.0],
+            (None, _) => [0.0; 3],
+            (Some(_), AovKind::Depth) => [hit.t, 0.0, 0.0],
+            (Some((_, point)), AovKind::Normal) => point.normal.as_vec3().to_array(),
+            (Some((_, point)), AovKind::Position) => (point.position + tracer.scene.origin).as_vec3().to_array(),
+            (Some((view, _)), AovKind::Uv) => {
+                let uv = texture_coordinates(tracer.scene, tracer.world, view, hit);
+                [uv.x as f32, uv.y as f32, 0.0]
+            }
+            (Some(_), AovKind::Id) => [f32::from_bits(hit.instance + 1), f32::from_bits(hit.primitive + 1), 0.0],
+            (Some((view, point)), AovKind::Albedo) => {
+                let material = &tracer.scene.materials[point.material as usize];
+                tracer.colors(material, view, hit).diffuse.to_array()
+            }
+        };
+        for (value, channel) in values.into_iter().zip(channels.by_ref().take(kind.channels().len())) {
+            channel.push(value);
+        }
+    }
+}
+
+fn copy_tile(picture: &mut Film, area: Crop, tile: &Tile) {
+    let tile_width = (tile.area.x1 - tile.area.x0) as usize;
+    for (row, y) in (tile.area.y0..tile.area.y1).enumerate() {
+        let from = row * tile_width..(row + 1) * tile_width;
+        let start = (y - area.y0) as usize * picture.width as usize + (tile.area.x0 - area.x0) as usize;
+        let to = start..start + tile_width;
+        picture.color[to.clone()].copy_from_slice(&tile.color[from.clone()]);
+        if let Some(alpha) = &mut picture.alpha {
+            alpha[to.clone()].copy_from_slice(&tile.alpha[from.clone()]);
+        }
+        let channels = picture.aovs.iter_mut().flat_map(|aov| &mut aov.channels);
+        for (channel, values) in channels.zip(&tile.aovs) {
+            channel[to.clone()].copy_from_slice(&values[from.clone()]);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tiles_cover_an_area_once() {
+        for area in [Crop { x0: 0, y0: 0, x1: 70, y1: 33 }, Crop { x0: 31, y0: 5, x1: 65, y1: 6 }] {
+            let mut seen = std::collections::HashSet::new();
+            for tile in tiles_of(area) {
+                for y in tile.y0..tile.y1 {
+                    for x in tile.x0..tile.x1 {
+                        assert!(seen.insert((x, y)));
+                    }
+                }
+            }
+            assert_eq!(seen.len() as u32, (area.x1 - area.x0) * (area.y1 - area.y0));
+        }
+    }
+}

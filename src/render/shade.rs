@@ -1,0 +1,199 @@
+//! `Shade`: the colour of a point,
+//! `I = Oa + sum_i Si Ipi [(1 - kt) Od (N.Li) + ks Os (R.V)^n] + kr Ir + kt It`, term by term.
+
+use glam::DVec3;
+
+use crate::geometry::Hit;
+use crate::math::vector::{dot, normalize};
+use crate::render::intersect::Intersect;
+use crate::render::shadow::Illumination;
+use crate::render::surface::{SurfacePoint, texture_coordinates};
+use crate::render::trace::{TracedRay, Tracer};
+use crate::scene::camera::ViewRay;
+use crate::scene::{Clamp, Material, Rgb};
+
+/// A material's terms at a point, textures looked up.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurfaceColors {
+    /// Oa, emission included.
+    pub ambient: Rgb,
+    /// Od.
+    pub diffuse: Rgb,
+}
+
+/// Where a ray goes that passes through a surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Refraction {
+    /// Through, in this unit direction.
+    Through(DVec3),
+    /// Nothing passes: all is reflected inside.
+    Total,
+}
+
+impl<I: Intersect> Tracer<'_, I> {
+    /// The linear colour of the point that `hit` found along `view`.
+    #[doc(alias = "Shade")]
+    pub fn shade(&self, view: &ViewRay, hit: &Hit, depth: u32) -> Rgb {
+        let point = SurfacePoint::of(self.scene, self.world, view, hit);
+        let material = &self.scene.materials[point.material as usize];
+        let colors = self.colors(material, view, hit);
+
+        // Ambient, then each light: diffuse and highlight.
+        let mut color = colors.ambient;
+        for light in &self.scene.lights {
+            let Some(illumination) = Illumination::at(light, &point, self.scene.origin) else { continue };
+            let visible = self.visibility(&point, &illumination);
+            if visible != Rgb::ZERO {
+                color += visible * illumination.color * direct(material, colors.diffuse, &point, view, &illumination);
+            }
+        }
+
+        // Mirror and transmission.
+        if depth < self.scene.film.max_depth {
+            if material.is_reflective() {
+                self.count(|counts| counts.reflected += 1);
+                color += material.kr * self.trace(&reflected_ray(&point, view), depth + 1);
+            }
+            if material.is_transmissive() {
+                color += material.kt * self.trace(&self.transmitted_ray(&point, material, view), depth + 1);
+            }
+        }
+
+        match self.scene.film.clamp {
+            Clamp::Shade => color.min(Rgb::ONE),
+            Clamp::Output => color,
+        }
+    }
+
+    /// The material's colours at a hit.
+    pub fn colors(&self, material: &Material, view: &ViewRay, hit: &Hit) -> SurfaceColors {
+        let texel = match material.diffuse_texture {
+            Some(reference) => {
+                let uv = texture_coordinates(self.scene, self.world, view, hit);
+                self.scene.textures[reference.texture as usize].sample(uv * reference.scale + reference.offset)
+            }
+            None => Rgb::ONE,
+        };
+        let diffuse = material.diffuse * texel;
+        let ambient = material.ambient.unwrap_or(self.scene.ambient * diffuse);
+        SurfaceColors { ambient: ambient + material.emission, diffuse }
+    }
+
+    fn transmitted_ray(&self, point: &SurfacePoint, material: &Material, view: &ViewRay) -> TracedRay {
+        match refract(point, f64::from(material.ior), view.direction) {
+            Refraction::Through(direction) => {
+                self.count(|counts| counts.refracted += 1);
+                TracedRay::spawned(point.origin_inside(), point.position, direction)
+            }
+            Refraction::Total => {
+                self.count(|counts| counts.reflected += 1);
+                reflected_ray(point, view)
+            }
+        }
+    }
+}
+
+/// `(1 - kt) Od (N.L) + ks Os (R.V)^n` for one light.
+fn direct(material: &Material, diffuse: Rgb, point: &SurfacePoint, view: &ViewRay, illumination: &Illumination) -> Rgb {
+    let n_dot_l = illumination.n_dot_l;
+    let mut sum = (Rgb::ONE - material.kt) * diffuse * (n_dot_l as f32);
+    if material.ks != Rgb::ZERO {
+        let reflected = point.normal * (2.0 * n_dot_l) - illumination.to_light;
+        let r_dot_v = -dot(reflected, view.direction);
+        if r_dot_v > 0.0 {
+            sum += material.ks * material.specular * (highlight(r_dot_v, material.shininess) as f32);
+        }
+    }
+    sum
+}
+
+/// `x^n` for x in (0, 1]; whole exponents by repeated squaring, others by `libm`. At most 1: R.V of unit vectors may
+/// exceed 1 by rounding.
+fn highlight(x: f64, n: f32) -> f64 {
+    let x = x.min(1.0);
+    if n >= 0.0 && n <= 65536.0 && n.fract() == 0.0 {
+        let (mut base, mut exponent, mut product) = (x, n as u32, 1.0);
+        while exponent > 0 {
+            if exponent & 1 == 1 {
+                product *= base;
+            }
+            base *= base;
+            exponent >>= 1;
+        }
+        product
+    } else {
+        libm::pow(x, f64::from(n))
+    }
+}
+
+/// The mirror ray of a point.
+fn reflected_ray(point: &SurfacePoint, view: &ViewRay) -> TracedRay {
+    TracedRay::spawned(point.origin_outside(), point.position, reflect(point, view.direction))
+}
+
+/// The mirror direction, never below the surface.
+///
+/// An interpolated normal may send the mirror ray into the surface it leaves. It is then lifted along the true normal
+/// to just above the horizon: `min(0.9 V.Ng, 0.01)`, the threshold of Cycles' `ensure_valid_specular_reflection`,
+/// which tilts the normal instead.
+fn reflect(point: &SurfacePoint, direction: DVec3) -> DVec3 {
+    let along = dot(direction, point.normal);
+    let mirrored = direction - point.normal * (2.0 * along);
+    let threshold = (-0.9 * dot(direction, point.geometric_normal)).clamp(0.0, 0.01);
+    keep_above(mirrored, point.geometric_normal, threshold)
+}
+
+/// The unit direction, lifted along `normal` where it does not rise above the surface by at least `threshold`.
+fn keep_above(direction: DVec3, normal: DVec3, threshold: f64) -> DVec3 {
+    let height = dot(direction, normal);
+    if height >= threshold && height > 0.0 {
+        return normalize(direction).unwrap_or(normal);
+    }
+    // For a view within the surface the threshold is 0: any positive height will do.
+    normalize(direction + normal * (threshold.max(1e-6) - height)).unwrap_or(normal)
+}
+
+/// Snell's law at a point whose inside has index of refraction `ior` relative to the outside.
+pub fn refract(point: &SurfacePoint, ior: f64, direction: DVec3) -> Refraction {
+    let ratio = if point.from_outside { 1.0 / ior } else { ior };
+    // An interpolated normal may face away from the ray: then the true one decides.
+    let cosine = -dot(direction, point.normal);
+    let (normal, cosine) = if cosine > 0.0 {
+        (point.normal, cosine)
+    } else {
+        (point.geometric_normal, (-dot(direction, point.geometric_normal)).max(0.0))
+    };
+    let sine_squared = ratio * ratio * (1.0 - cosine * cosine).max(0.0);
+    if sine_squared > 1.0 {
+        return Refraction::Total;
+    }
+    let through = direction * ratio + normal * (ratio * cosine - (1.0 - sine_squared).sqrt());
+    Refraction::Through(keep_above(through, -point.geometric_normal, 0.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whole_exponents_agree_with_pow() {
+        for n in [0.0, 1.0, 2.0, 7.0, 32.0, 500.0] {
+            for x in [0.1, 0.5, 0.99, 1.0] {
+                let expected = libm::pow(x, f64::from(n));
+                assert!((highlight(x, n) - expected).abs() <= 1e-13 * expected, "{x}^{n}");
+            }
+        }
+        assert!((highlight(0.5, 2.5) - libm::pow(0.5, 2.5)).abs() < 1e-15);
+    }
+
+    #[test]
+    fn lifted_directions_are_above_the_surface_and_of_unit_length() {
+        for angle in [-80.0f64, -10.0, -1e-9, 0.0, 1e-9, 0.1, 45.0] {
+            let (sin, cos) = libm::sincos(angle.to_radians());
+            for threshold in [0.0, 1e-3, 0.01] {
+                let lifted = keep_above(DVec3::new(cos, sin, 0.0), DVec3::Y, threshold);
+                assert!(lifted.y > 0.0 && (lifted.length() - 1.0).abs() < 1e-12, "{angle} {threshold}: {lifted}");
+            }
+        }
+    }
+}

@@ -1,0 +1,118 @@
+//! `Si` in the shading formula: how a light reaches a point, and what stands between.
+
+use glam::DVec3;
+
+use crate::geometry::{Key, Ray};
+use crate::math::float::{gamma, round_down};
+use crate::math::vector::{dot, length, normalize};
+use crate::render::intersect::Intersect;
+use crate::render::surface::SurfacePoint;
+use crate::render::trace::{SPAWNED_T_MIN, Tracer, to_f32};
+use crate::scene::{Falloff, Light, LightKind, Rgb};
+
+/// The light that would reach a point if nothing stood between.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Illumination {
+    /// Unit vector from the point to the light: L.
+    pub to_light: DVec3,
+    /// N.L, greater than 0.
+    pub n_dot_l: f64,
+    /// Ipi, weakened by distance and cone.
+    pub color: Rgb,
+    /// Where the light is, in the renderer's world; `None` if infinitely far away.
+    pub position: Option<DVec3>,
+}
+
+impl Illumination {
+    /// What `light` sends to a point; `None` where N.L is not positive, the light is at the point, or the point lies
+    /// outside its cone: then no shadow ray is traced.
+    pub fn at(light: &Light, point: &SurfacePoint, scene_origin: DVec3) -> Option<Self> {
+        let (to_light, strength, position) = match light.kind {
+            LightKind::Directional { direction } => (normalize(-direction)?, 1.0, None),
+            LightKind::Point { position, falloff } => {
+                let (to_light, strength, position) = from_point(position - scene_origin, falloff, point)?;
+                (to_light, strength, Some(position))
+            }
+            LightKind::Spot { position, direction, inner_angle, outer_angle, falloff } => {
+                let (to_light, strength, position) = from_point(position - scene_origin, falloff, point)?;
+                let cosine = -dot(to_light, normalize(direction)?);
+                (to_light, strength * cone(cosine, inner_angle, outer_angle)?, Some(position))
+            }
+        };
+        let n_dot_l = dot(point.normal, to_light);
+        (n_dot_l > 0.0).then(|| Self { to_light, n_dot_l, color: light.color * (strength as f32), position })
+    }
+}
+
+/// Direction, strength and place of a light at a point.
+fn from_point(position: DVec3, falloff: Falloff, point: &SurfacePoint) -> Option<(DVec3, f64, DVec3)> {
+    let offset = position - point.position;
+    let strength = match falloff {
+        Falloff::None => 1.0,
+        Falloff::InverseSquare => 1.0 / dot(offset, offset),
+    };
+    Some((normalize(offset)?, strength, position))
+}
+
+/// The share of a spot's light at an angle to its axis, given by its cosine: glTF's KHR_lights_punctual, the square
+/// of a linear ramp in the cosine. `None` outside the cone.
+fn cone(cosine: f64, inner_angle: f64, outer_angle: f64) -> Option<f64> {
+    let (inner, outer) = (libm::cos(inner_angle), libm::cos(outer_angle));
+    if cosine >= inner {
+        return Some(1.0);
+    }
+    let share = (cosine - outer) / (inner - outer);
+    (share > 0.0).then(|| share * share)
+}
+
+impl<I: Intersect> Tracer<'_, I> {
+    /// Si, per channel: 0 where an opaque surface blocks the light, the product of kt over the surfaces crossed, in
+    /// the order of hits, where they let light through, else 1.
+    pub fn visibility(&self, point: &SurfacePoint, illumination: &Illumination) -> Rgb {
+        let ray = shadow_ray(point, illumination);
+        self.count(|counts| counts.shadow += 1);
+        if self.intersect.occluded_by_opaque(&ray) {
+            return Rgb::ZERO;
+        }
+        let mut visible = Rgb::ONE;
+        if self.world.all_opaque {
+            return visible;
+        }
+        let mut hit = self.intersect.next_transmissive_after(&ray, Key::BEFORE_ALL);
+        while hit.is_hit() {
+            visible *= self.scene.materials[self.material_of(&hit) as usize].kt;
+            if visible == Rgb::ZERO {
+                break;
+            }
+            hit = self.intersect.next_transmissive_after(&ray, hit.key());
+        }
+        visible
+    }
+
+    /// The material of what was hit.
+    fn material_of(&self, hit: &crate::geometry::Hit) -> u32 {
+        let object = &self.scene.objects[hit.instance as usize];
+        object.material.unwrap_or_else(|| match object.shape {
+            crate::scene::Shape::Mesh(mesh) => self.scene.meshes[mesh as usize].material(hit.primitive),
+            crate::scene::Shape::Quadric(_) => 0,
+        })
+    }
+}
+
+/// The ray from a point to a light: direction of any length; it ends just before the light.
+///
+/// The end is shortened by the bound that moves the start of a ray off a surface through the light, so that a lamp
+/// that lies on a ceiling shines.
+fn shadow_ray(point: &SurfacePoint, illumination: &Illumination) -> Ray {
+    let origin = point.origin_outside();
+    let (direction, t_max) = match illumination.position {
+        None => (illumination.to_light, f32::INFINITY),
+        Some(position) => {
+            let offset = position - origin.as_dvec3();
+            let distance = length(offset);
+            let error = gamma(7) * (position.abs().max_element() + distance);
+            (offset, round_down(1.0 - error / distance))
+        }
+    };
+    Ray { origin, t_min: SPAWNED_T_MIN, direction: to_f32(direction), t_max }
+}

@@ -1,0 +1,171 @@
+//! What shading needs of a hit point, made once for the winner, in f64.
+
+use glam::{DVec2, DVec3, Vec3};
+
+use crate::geometry::Hit;
+use crate::math::float::{gamma, round_down, round_up};
+use crate::math::vector::{cross, dot, normalize};
+use crate::render::world::{Instance, World};
+use crate::scene::camera::ViewRay;
+use crate::scene::{Scene, Shape};
+
+/// A point on a surface, in the renderer's world.
+#[derive(Debug, Clone, Copy)]
+pub struct SurfacePoint {
+    /// Where it is, f64.
+    pub position: DVec3,
+    /// Unit normal of the true surface, on the side that the ray came from.
+    pub geometric_normal: DVec3,
+    /// Unit shading normal, on the same side as `geometric_normal`.
+    pub normal: DVec3,
+    /// Whether the ray came from outside: against the front of the triangle, from where a quadric's F is positive.
+    pub from_outside: bool,
+    /// Position of the material in the scene's list.
+    pub material: u32,
+    /// How far intersections with this surface may be off along its normal.
+    offset: f64,
+}
+
+impl SurfacePoint {
+    /// Solves for the point where `ray` meets the surface that `hit` found.
+    ///
+    /// The hit was decided in f32; the point is solved again in f64 from the surface and the unrounded ray, so that
+    /// its error does not depend on how far the ray has come.
+    pub fn of(scene: &Scene, world: &World, ray: &ViewRay, hit: &Hit) -> Self {
+        let object = &scene.objects[hit.instance as usize];
+        let instance = &world.instances[hit.instance as usize];
+        match instance.shape {
+            Shape::Mesh(mesh) => {
+                let mesh = &scene.meshes[mesh as usize];
+                let material = object.material.unwrap_or_else(|| mesh.material(hit.primitive));
+                let flat = scene.materials[material as usize].flat;
+                let corners = mesh.triangle(hit.primitive).map(|p| p.as_dvec3());
+                let weights = refined_weights(instance, ray, hit, corners);
+                let [wa, wb, wc] = weights;
+                let [a, b, c] = corners;
+                let position = a * wa + b * wb + c * wc;
+                let face = cross(b - a, c - a);
+                let smooth = if flat {
+                    None
+                } else {
+                    mesh.normals.as_ref().and_then(|normals| {
+                        let [na, nb, nc] = mesh.indices[hit.primitive as usize].map(|i| normals[i as usize]);
+                        let given = na != Vec3::ZERO && nb != Vec3::ZERO && nc != Vec3::ZERO;
+                        given.then(|| na.as_dvec3() * wa + nb.as_dvec3() * wb + nc.as_dvec3() * wc)
+                    })
+                };
+                // Pharr et al. 6.8.5: a point from barycentrics is off by gamma(7) of what was summed. The f64 sum
+                // is better than that, but a ray that starts here meets the triangle with an f32 test of that size.
+                let error = (a.abs() * wa + b.abs() * wb + c.abs() * wc) * gamma(7);
+                Self::placed(instance, ray, position, face, smooth, error, material)
+            }
+            Shape::Quadric(quadric) => {
+                let quadric = &scene.quadrics[quadric as usize];
+                let (origin, direction) = instance.local_line(ray.origin, ray.direction);
+                let point = quadric.point(origin, direction, hit.primitive);
+                // Besides the error of the f64 solution there is only the f32 rounding of the new ray's origin.
+                let error = DVec3::splat(point.error);
+                let material = object.material.unwrap_or(0);
+                Self::placed(instance, ray, point.position, point.normal, None, error, material)
+            }
+        }
+    }
+
+    /// Brings a point with its normals and error bound from object space into the world.
+    fn placed(
+        instance: &Instance,
+        ray: &ViewRay,
+        position: DVec3,
+        face: DVec3,
+        smooth: Option<DVec3>,
+        error: DVec3,
+        material: u32,
+    ) -> Self {
+        let against = -ray.direction;
+        let transform = &instance.transform;
+        let (world, error, face, smooth) = if instance.identity {
+            (position, error, face, smooth)
+        } else {
+            // Pharr et al. 6.8.6: transforming adds 3 gamma of the magnitudes; one more for rounding the local ray.
+            let m = transform.to_world();
+            let magnitude = |v: DVec3| {
+                m.matrix3.x_axis.abs() * v.x.abs()
+                    + m.matrix3.y_axis.abs() * v.y.abs()
+                    + m.matrix3.z_axis.abs() * v.z.abs()
+            };
+            let moved = magnitude(error) + (magnitude(position) + m.translation.abs()) * gamma(4);
+            let smooth = smooth.map(|n| transform.normal_to_world(n));
+            (transform.point_to_world(position), moved, transform.normal_to_world(face), smooth)
+        };
+        let outward = normalize(face).unwrap_or(against);
+        let from_outside = dot(outward, against) >= 0.0;
+        let geometric_normal = if from_outside { outward } else { -outward };
+        let normal = smooth.and_then(normalize).unwrap_or(geometric_normal);
+        let normal = if dot(normal, geometric_normal) < 0.0 { -normal } else { normal };
+        let error = error + world.abs() * gamma(1);
+        let offset = dot(geometric_normal.abs(), error);
+        Self { position: world, geometric_normal, normal, from_outside, material, offset }
+    }
+
+    /// Where a ray that leaves on the side of the incoming ray starts, rounded to f32 away from the surface.
+    pub fn origin_outside(&self) -> Vec3 {
+        self.origin_along(self.geometric_normal)
+    }
+
+    /// Where a ray that goes through the surface starts.
+    pub fn origin_inside(&self) -> Vec3 {
+        self.origin_along(-self.geometric_normal)
+    }
+
+    fn origin_along(&self, normal: DVec3) -> Vec3 {
+        let moved = self.position + normal * self.offset;
+        let away = |x: f64, n: f64| {
+            if n > 0.0 {
+                round_up(x)
+            } else if n < 0.0 {
+                round_down(x)
+            } else {
+                x as f32
+            }
+        };
+        Vec3::new(away(moved.x, normal.x), away(moved.y, normal.y), away(moved.z, normal.z))
+    }
+}
+
+/// The weights of a triangle's corners where the f64 ray meets it, kept inside the triangle.
+///
+/// Möller and Trumbore's test in f64 serves as a solver here: that the triangle is hit is already decided. A ray that
+/// runs within the plane keeps the weights of the f32 hit.
+fn refined_weights(instance: &Instance, ray: &ViewRay, hit: &Hit, [a, b, c]: [DVec3; 3]) -> [f64; 3] {
+    let (origin, direction) = instance.local_line(ray.origin, ray.direction);
+    let (ab, ac) = (b - a, c - a);
+    let p = cross(direction, ac);
+    let determinant = dot(ab, p);
+    let from_a = origin - a;
+    let u = dot(from_a, p) / determinant;
+    let v = dot(direction, cross(from_a, ab)) / determinant;
+    let (u, v) = if u.is_finite() && v.is_finite() { (u, v) } else { (f64::from(hit.u), f64::from(hit.v)) };
+    let u = u.clamp(0.0, 1.0);
+    let v = v.clamp(0.0, 1.0 - u);
+    [1.0 - u - v, u, v]
+}
+
+/// Texture coordinates of a hit point; the origin if its mesh has none.
+pub fn texture_coordinates(scene: &Scene, world: &World, ray: &ViewRay, hit: &Hit) -> DVec2 {
+    let instance = &world.instances[hit.instance as usize];
+    match instance.shape {
+        Shape::Mesh(mesh) => {
+            let mesh = &scene.meshes[mesh as usize];
+            let Some(uvs) = &mesh.uvs else { return DVec2::ZERO };
+            let corners = mesh.triangle(hit.primitive).map(|p| p.as_dvec3());
+            let weights = refined_weights(instance, ray, hit, corners);
+            let [a, b, c] = mesh.indices[hit.primitive as usize].map(|i| uvs[i as usize].as_dvec2());
+            a * weights[0] + b * weights[1] + c * weights[2]
+        }
+        Shape::Quadric(quadric) => {
+            let quadric = &scene.quadrics[quadric as usize];
+            let (origin, direction) = instance.local_line(ray.origin, ray.direction);
+            quadric.uv(quadric.point(origin, direction, hit.primitive).position, hit.primitive)
+        }
+    }
+}

@@ -1,0 +1,127 @@
+//! `Trace`: what a ray sees.
+
+use std::cell::Cell;
+
+use glam::{DVec2, DVec3, Vec3};
+
+use crate::geometry::{Hit, Ray};
+use crate::math::vector::dot;
+use crate::render::intersect::Intersect;
+use crate::render::settings::RayCounts;
+use crate::render::world::World;
+use crate::scene::camera::ViewRay;
+use crate::scene::{Background, Rgb, Scene};
+
+/// Spawned rays begin at the smallest normal number, not at 0: a ray whose rounded origin still lies on its own
+/// surface must not find it.
+pub(super) const SPAWNED_T_MIN: f32 = f32::MIN_POSITIVE;
+
+/// Traces rays through a scene and shades what they hit; one per thread, since it counts.
+pub struct Tracer<'a, I> {
+    /// The scene.
+    pub(super) scene: &'a Scene,
+    /// Its objects, prepared.
+    pub(super) world: &'a World,
+    /// What answers rays.
+    pub(super) intersect: &'a I,
+    pub(super) counts: Cell<RayCounts>,
+}
+
+/// A ray on its way: in f32 for the trees, in f64 for shading.
+#[derive(Debug, Clone, Copy)]
+pub struct TracedRay {
+    /// What is intersected.
+    pub ray: Ray,
+    /// The same ray before rounding, with unit direction.
+    pub view: ViewRay,
+}
+
+impl TracedRay {
+    /// A camera ray.
+    pub fn camera(view: ViewRay) -> Self {
+        Self { ray: Ray::new(to_f32(view.origin), to_f32(view.direction)), view }
+    }
+
+    /// A ray that leaves a surface: it starts at `offset_origin`, which is `origin` moved off the surface.
+    pub(super) fn spawned(offset_origin: Vec3, origin: DVec3, direction: DVec3) -> Self {
+        let ray =
+            Ray { origin: offset_origin, t_min: SPAWNED_T_MIN, direction: to_f32(direction), t_max: f32::INFINITY };
+        Self { ray, view: ViewRay { origin, direction } }
+    }
+}
+
+impl<'a, I: Intersect> Tracer<'a, I> {
+    /// A tracer that has counted nothing yet.
+    pub fn new(scene: &'a Scene, world: &'a World, intersect: &'a I) -> Self {
+        Self { scene, world, intersect, counts: Cell::default() }
+    }
+
+    /// The linear colour that a ray sees; `depth` counts the reflections and refractions before it.
+    ///
+    /// The nearest hit is shaded; a ray that hits nothing sees the background.
+    #[doc(alias = "Trace")]
+    pub fn trace(&self, ray: &TracedRay, depth: u32) -> Rgb {
+        let hit = self.intersect.closest(&ray.ray);
+        if hit.is_hit() {
+            self.shade(&ray.view, &hit, depth)
+        } else {
+            background(&self.scene.background, ray.view.direction)
+        }
+    }
+
+    /// What a camera ray sees and what it hit.
+    pub fn trace_camera(&self, view: ViewRay) -> (Rgb, Hit) {
+        self.count(|counts| counts.camera += 1);
+        let ray = TracedRay::camera(view);
+        let hit = self.intersect.closest(&ray.ray);
+        let color =
+            if hit.is_hit() { self.shade(&view, &hit, 0) } else { background(&self.scene.background, view.direction) };
+        (color, hit)
+    }
+
+    /// The rays traced so far.
+    pub fn counts(&self) -> RayCounts {
+        self.counts.get()
+    }
+
+    pub(super) fn count(&self, add: impl FnOnce(&mut RayCounts)) {
+        let mut counts = self.counts.get();
+        add(&mut counts);
+        self.counts.set(counts);
+    }
+}
+
+/// What lies behind everything in a unit direction.
+pub fn background(background: &Background, direction: DVec3) -> Rgb {
+    match background {
+        Background::Color(color) => *color,
+        Background::Gradient { bottom, top, up } => {
+            let height = (0.5 + 0.5 * dot(direction, *up)) as f32;
+            *bottom * (1.0 - height) + *top * height
+        }
+        Background::Image { texture, intensity } => {
+            let u = 0.5 + libm::atan2(direction.x, -direction.z) / std::f64::consts::TAU;
+            let v = 0.5 + libm::asin(direction.y.clamp(-1.0, 1.0)) / std::f64::consts::PI;
+            texture.sample(DVec2::new(u, v)) * *intensity
+        }
+        Background::Transparent => Rgb::ZERO,
+    }
+}
+
+/// Rounds each component to the nearest f32.
+pub(super) fn to_f32(v: DVec3) -> Vec3 {
+    Vec3::new(v.x as f32, v.y as f32, v.z as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gradients_go_from_bottom_to_top() {
+        let gradient = Background::Gradient { bottom: Rgb::ZERO, top: Rgb::ONE, up: DVec3::Y };
+        assert_eq!(background(&gradient, DVec3::Y), Rgb::ONE);
+        assert_eq!(background(&gradient, -DVec3::Y), Rgb::ZERO);
+        assert_eq!(background(&gradient, DVec3::X), Rgb::splat(0.5));
+    }
+}

@@ -1,0 +1,112 @@
+//! The scene's objects made relative to its origin and ready for rays: transforms with inverses, world boxes.
+
+use glam::{DAffine3, DVec3, Vec3};
+
+use crate::error::Result;
+use crate::geometry::ray::Interval;
+use crate::geometry::{Bounds, PreparedRay};
+use crate::math::Transform;
+use crate::scene::{Scene, Shape};
+
+/// An object as rays meet it.
+#[derive(Debug, Clone)]
+pub struct Instance {
+    /// What it is made of.
+    pub shape: Shape,
+    /// From the shape's coordinates (a mesh's are relative to its own origin) to the renderer's world, whose zero is
+    /// the scene's origin.
+    pub transform: Transform,
+    /// Whether `transform` is exactly the identity; then rays need no transforming.
+    pub identity: bool,
+    /// A box in the renderer's world around the object; `None` if it has no end.
+    pub bounds: Option<Bounds>,
+    /// Whether no part of it lets light through.
+    pub opaque: bool,
+}
+
+/// All objects of a scene, prepared.
+#[derive(Debug, Clone)]
+pub struct World {
+    /// The objects, in the scene's order.
+    pub instances: Vec<Instance>,
+    /// Whether no object lets light through: then a shadow ray is a yes or a no.
+    pub all_opaque: bool,
+}
+
+impl World {
+    /// Prepares the objects of a scene.
+    ///
+    /// # Errors
+    /// Names the object whose transform is singular or not finite.
+    pub fn new(scene: &Scene) -> Result<Self> {
+        let mesh_bounds: Vec<Bounds> = scene.meshes.iter().map(|mesh| mesh.bounds()).collect();
+        let mesh_opaque: Vec<bool> = scene
+            .meshes
+            .iter()
+            .map(|mesh| !mesh.live_triangles().any(|n| scene.materials[mesh.material(n) as usize].is_transmissive()))
+            .collect();
+        let prepare = |object: &crate::scene::Object| {
+            let (shape_origin, bounds, opaque) = match object.shape {
+                Shape::Mesh(mesh) => {
+                    let number = mesh as usize;
+                    (scene.meshes[number].origin, Some(mesh_bounds[number]), mesh_opaque[number])
+                }
+                Shape::Quadric(quadric) => (DVec3::ZERO, scene.quadrics[quadric as usize].bounds(), true),
+            };
+            let transform = Transform::new(relative(&object.transform, shape_origin, scene.origin))
+                .map_err(|error| error.remedy(format!("object `{}`: scales must not be 0", object.name)))?;
+            Ok(Instance {
+                shape: object.shape,
+                identity: transform.is_identity(),
+                bounds: bounds.map(|bounds| bounds.to_world(&transform)),
+                opaque: object.material.map_or(opaque, |m| !scene.materials[m as usize].is_transmissive()),
+                transform,
+            })
+        };
+        let instances = scene.objects.iter().map(prepare).collect::<Result<Vec<_>>>()?;
+        let all_opaque = instances.iter().all(|instance| instance.opaque);
+        Ok(Self { instances, all_opaque })
+    }
+}
+
+impl Instance {
+    /// Brings a world ray into the object's space; `None` if it passes the object's box by.
+    ///
+    /// The local ray is rounded to f32 once. Its direction keeps its length, so that t is the same in both spaces.
+    #[inline]
+    pub fn local_ray(&self, ray: &PreparedRay, clip: Interval) -> Option<PreparedRay> {
+        let (origin, direction) = self.local_line(ray.origin.as_dvec3(), ray.direction.as_dvec3());
+        PreparedRay::local(to_f32(origin), to_f32(direction), ray, clip)
+    }
+
+    /// Brings a world line into the object's space in f64.
+    #[inline]
+    pub fn local_line(&self, origin: DVec3, direction: DVec3) -> (DVec3, DVec3) {
+        if self.identity {
+            (origin, direction)
+        } else {
+            (self.transform.point_to_object(origin), self.transform.vector_to_object(direction))
+        }
+    }
+
+    /// The part of a world ray inside the object's box; all of it if the object has no end.
+    #[inline]
+    pub fn clip(&self, ray: &PreparedRay) -> Interval {
+        match &self.bounds {
+            Some(bounds) => bounds.interval(ray, f32::NEG_INFINITY, f32::INFINITY),
+            None => Interval::ALL,
+        }
+    }
+}
+
+/// `p -> transform (shape_origin + p) - scene_origin`, exactly the identity where nothing moves.
+fn relative(transform: &DAffine3, shape_origin: DVec3, scene_origin: DVec3) -> DAffine3 {
+    let m = transform.matrix3;
+    let moved = m.x_axis * shape_origin.x + m.y_axis * shape_origin.y + m.z_axis * shape_origin.z;
+    // The difference first: for an untransformed mesh it is an exact difference of origins, usually zero.
+    DAffine3 { matrix3: m, translation: (moved - scene_origin) + transform.translation }
+}
+
+fn to_f32(v: DVec3) -> Vec3 {
+    Vec3::new(v.x as f32, v.y as f32, v.z as f32)
+}
