@@ -40,6 +40,7 @@ pub struct Outputs {
     pub scene: Option<PathBuf>,
     /// Rays, times and memory.
     pub stats: Option<PathBuf>,
+    no_clobber: bool,
 }
 
 impl Outputs {
@@ -74,9 +75,10 @@ impl Outputs {
             partial,
             scene: arguments.save_scene.clone(),
             stats: arguments.stats_json.clone(),
+            no_clobber: arguments.no_clobber,
         };
         outputs.refuse_inputs([arguments.input.as_path()])?;
-        outputs.check(arguments.no_clobber)?;
+        outputs.check()?;
         Ok(outputs)
     }
 
@@ -103,15 +105,24 @@ impl Outputs {
             .flatten()
     }
 
-    fn check(&self, no_clobber: bool) -> Result<()> {
+    /// Fails if the file exists and must stay.
+    ///
+    /// # Errors
+    /// Names the file.
+    pub fn refuse_clobber(&self, path: &Path) -> Result<()> {
+        // What is no regular file (a device, a pipe) is written to, not replaced.
+        if !self.no_clobber || !path.is_file() {
+            return Ok(());
+        }
+        Err(Error::caller("the file exists and --no-clobber was given")
+            .at_path(path)
+            .remedy("name another file, or leave out --no-clobber"))
+    }
+
+    fn check(&self) -> Result<()> {
         let mut taken = Vec::new();
         for path in self.files() {
-            // What is no regular file (a device, a pipe) is written to, not replaced.
-            if no_clobber && path.is_file() {
-                return Err(Error::caller("the file exists and --no-clobber was given")
-                    .at_path(path)
-                    .remedy("name another file, or leave out --no-clobber"));
-            }
+            self.refuse_clobber(path)?;
             check_writable(path)?;
             let identity = identity(path);
             if taken.contains(&identity) {

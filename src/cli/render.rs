@@ -10,6 +10,7 @@ use super::terminal::{self, Terminal};
 use super::{camera, ledger, outputs};
 use crate::error::{Error, Result};
 use crate::formats::{self, picture};
+use crate::progress::Progress;
 use crate::render::{Crop, Film, Renderer};
 use crate::scene::FilmSettings;
 
@@ -37,6 +38,7 @@ pub fn run(arguments: &RenderArguments) -> Result<()> {
         ledger::report(&ledger, arguments.verbose);
     }
     report_time("load", seconds.load);
+    terminal.check()?;
     arguments.film.apply(&mut scene.film);
     if let Some(crop) = arguments.film.crop {
         check_crop(crop, &scene.film)?;
@@ -132,7 +134,7 @@ fn save_partial(film: &Film, outputs: &Outputs, quiet: bool) -> Error {
     let Some(path) = &outputs.partial else {
         return Error::cancelled();
     };
-    match picture::save(film, path) {
+    match outputs.refuse_clobber(path).and_then(|()| picture::save(film, path)) {
         Ok(()) if quiet => {}
         Ok(()) => terminal::report(&format!("interrupted: {} has what was finished", path.display())),
         Err(error) => terminal::report(&format!("error: {error}")),
