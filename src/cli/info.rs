@@ -11,7 +11,7 @@ use super::stats_json::SCHEMA;
 use super::terminal::{self, Terminal};
 use super::{info_text, ledger};
 use crate::error::{Error, Result};
-use crate::formats::{self, Loaded, Treatment};
+use crate::formats::{self, Ledger, Loaded, Treatment};
 use crate::geometry::TriangleMesh;
 use crate::geometry::mesh::{DroppedCounts, Materials};
 use crate::render::{BuildStats, Renderer};
@@ -23,6 +23,8 @@ use crate::scene::{FilmSettings, LightKind, Scene, Shape};
 pub struct Info<'a> {
     pub schema: u32,
     pub input: &'a Path,
+    /// All files that were read.
+    pub files: Vec<&'a Path>,
     pub triangles: Triangles,
     pub meshes: usize,
     pub instances: usize,
@@ -130,11 +132,11 @@ pub fn run(arguments: &InfoArguments) -> Result<()> {
     super::use_threads(arguments.build.threads)?;
     let loaded = formats::open(&arguments.input, &arguments.load.options(), &terminal);
     terminal.clear();
-    let loaded = loaded?;
-    ledger::report(&loaded.ledger, false);
-    let mut info = Info::of(&arguments.input, &loaded);
+    let Loaded { scene, ledger } = loaded?;
+    ledger::report(&ledger, false);
+    let mut info = Info::of(&arguments.input, &scene, &ledger);
     if arguments.tree || arguments.validate {
-        let renderer = Renderer::build(loaded.scene, &arguments.build.params(), &terminal);
+        let renderer = Renderer::build(scene, &arguments.build.params(), &terminal);
         terminal.clear();
         info.tree = Some(Tree::of(&renderer?, arguments)?);
     }
@@ -148,8 +150,7 @@ pub fn run(arguments: &InfoArguments) -> Result<()> {
 
 impl<'a> Info<'a> {
     /// Gathers everything but the tree.
-    pub fn of(input: &'a Path, loaded: &Loaded) -> Self {
-        let scene = &loaded.scene;
+    pub fn of(input: &'a Path, scene: &Scene, ledger: &'a Ledger) -> Self {
         let mut dropped = DroppedCounts::default();
         for counts in scene.meshes.iter().map(|mesh| mesh.dropped_counts) {
             dropped.non_finite += counts.non_finite;
@@ -169,6 +170,7 @@ impl<'a> Info<'a> {
         Self {
             schema: SCHEMA,
             input,
+            files: ledger.files().collect(),
             triangles: Triangles { unique: live_triangles(scene), instanced: scene.instanced_triangles(), dropped },
             meshes: scene.meshes.len(),
             instances: scene.objects.len(),
@@ -184,7 +186,7 @@ impl<'a> Info<'a> {
             needs: Needs::of(scene),
             bytes,
             bytes_per_triangle: bytes.per_triangle(all_triangles),
-            ledger: loaded.ledger.entries().map(entry).collect(),
+            ledger: ledger.entries().map(entry).collect(),
             tree: None,
         }
     }
@@ -268,13 +270,12 @@ fn bounds(scene: &Scene) -> Option<BoundsInfo> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::formats::Ledger;
     use crate::geometry::shapes;
     use crate::scene::{NamedCamera, Object, auto};
     use glam::{DAffine3, Vec3};
 
     /// One triangle far from zero, placed twice, with a second that has no area, and a sphere of radius 3.
-    fn loaded() -> Loaded {
+    fn scene() -> Scene {
         let mesh = TriangleMesh {
             origin: DVec3::new(100.0, 0.0, 0.0),
             positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
@@ -295,13 +296,13 @@ mod tests {
         };
         let camera = auto::frame(&scene, 0.0, 0.0, 0.5);
         scene.cameras.push(NamedCamera { name: "only".into(), camera });
-        Loaded { scene, ledger: Ledger::default() }
+        scene
     }
 
     #[test]
     fn instances_count_once_for_bytes_and_each_for_triangles() {
-        let loaded = loaded();
-        let info = Info::of(Path::new("a.obj"), &loaded);
+        let ledger = Ledger::default();
+        let info = Info::of(Path::new("a.obj"), &scene(), &ledger);
         assert_eq!((info.triangles.unique, info.triangles.instanced, info.triangles.dropped.zero_area), (1, 2, 1));
         assert_eq!((info.meshes, info.instances, info.quadrics), (1, 3, 1));
         let expected = Bytes { positions: 36, indices: 24, normals: 36, ..Default::default() };
@@ -312,14 +313,14 @@ mod tests {
 
     #[test]
     fn bounds_are_those_of_the_file_and_of_every_instance() {
-        let bounds = bounds(&loaded().scene).unwrap();
+        let bounds = bounds(&scene()).unwrap();
         assert_eq!((bounds.min, bounds.max), ([-3.0, -3.0, -3.0], [101.0, 3.0, 7.0]));
     }
 
     #[test]
     fn an_empty_scene_has_no_bounds_and_no_share_of_bytes() {
-        let loaded = Loaded { scene: Scene::default(), ledger: Ledger::default() };
-        let info = Info::of(Path::new("a.obj"), &loaded);
+        let ledger = Ledger::default();
+        let info = Info::of(Path::new("a.obj"), &Scene::default(), &ledger);
         assert!(info.bounds.is_none() && info.bytes_per_triangle.is_none() && info.active_camera.is_none());
     }
 }

@@ -37,6 +37,7 @@ pub fn run(arguments: &RenderArguments) -> Result<()> {
     if !arguments.quiet {
         ledger::report(&ledger, arguments.verbose);
     }
+    outputs.refuse_inputs(ledger.files())?;
     report_time("load", seconds.load);
     terminal.check()?;
     arguments.film.apply(&mut scene.film);

@@ -1,6 +1,7 @@
 //! What a loader did with each feature of a file: nothing is skipped in silence.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
 
 /// What became of a feature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
@@ -16,10 +17,11 @@ pub enum Treatment {
     Warning,
 }
 
-/// Features met in a file, with counts.
+/// Features met in a file, with counts, and the files that were read for it.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Ledger {
     entries: BTreeMap<(Treatment, String), u64>,
+    files: BTreeSet<PathBuf>,
 }
 
 impl Ledger {
@@ -29,8 +31,19 @@ impl Ledger {
         *self.entries.entry((treatment, feature.into())).or_default() += count;
     }
 
+    /// Records a file that is read, so that nothing is written over it.
+    pub fn note_file(&mut self, path: &Path) {
+        self.files.insert(path.to_path_buf());
+    }
+
+    /// All files that were read, once each, sorted.
+    pub fn files(&self) -> impl Iterator<Item = &Path> {
+        self.files.iter().map(PathBuf::as_path)
+    }
+
     /// Adds all of another ledger.
     pub fn merge(&mut self, other: Self) {
+        self.files.extend(other.files);
         for ((treatment, feature), count) in other.entries {
             self.note(treatment, feature, count);
         }
@@ -39,5 +52,25 @@ impl Ledger {
     /// All entries: treatment, feature, count; sorted.
     pub fn entries(&self) -> impl Iterator<Item = (Treatment, &str, u64)> {
         self.entries.iter().map(|((treatment, feature), &count)| (*treatment, feature.as_str(), count))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn merging_adds_counts_and_joins_files() {
+        let ledger = |count, file| {
+            let mut ledger = Ledger::default();
+            ledger.note(Treatment::Ignored, "map_bump", count);
+            ledger.note_file(Path::new(file));
+            ledger.note_file(Path::new("shared.png"));
+            ledger
+        };
+        let mut all = ledger(2, "b.obj");
+        all.merge(ledger(3, "a.obj"));
+        assert_eq!(all.entries().collect::<Vec<_>>(), [(Treatment::Ignored, "map_bump", 5)]);
+        assert_eq!(all.files().collect::<Vec<_>>(), ["a.obj", "b.obj", "shared.png"].map(Path::new));
     }
 }

@@ -7,3 +7,7 @@ pub mod command_line {}
 /// Coordinates, numbering, rays, hits and colours: what every part agrees on.
 #[doc = include_str!("conventions.md")]
 pub mod conventions {}
+
+/// How materials of model files become terms of the shading formula.
+#[doc = include_str!("materials.md")]
+pub mod materials {}

@@ -54,6 +54,7 @@ impl Libraries {
     }
 
     fn read_file(&mut self, path: &Path, ledger: &mut Ledger) -> Result<()> {
+        ledger.note_file(path);
         let file = File::open(path).map_err(|cause| Error::system(path, cause))?;
         let text = clean(path, BufReader::new(file), ledger)?;
         let (materials, _) =

@@ -57,6 +57,7 @@ const BYTES_PER_STEP: u64 = 1 << 20;
 /// vertices or corners; cancellation.
 pub fn load(path: &Path, options: &LoadOptions, progress: &dyn Progress) -> Result<Model> {
     let mut ledger = Ledger::default();
+    ledger.note_file(path);
     let mut parsed = read(path, progress)?;
     parsed.finish(&mut ledger);
     if parsed.faces.count == 0 {

@@ -48,6 +48,7 @@ impl Textures {
     }
 
     fn read(&mut self, path: &Path, clamp: bool, ledger: &mut Ledger) -> Option<u32> {
+        ledger.note_file(path);
         // The same image wrapped otherwise shares its texels.
         let mut texture = match self.known.get(&(path.to_path_buf(), !clamp)) {
             Some(&other) => self.list[other? as usize].clone(),
