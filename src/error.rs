@@ -81,6 +81,12 @@ impl Error {
         self
     }
 
+    /// Puts a place within the file before the message: `accessors[3]: message`.
+    pub fn within(mut self, place: impl fmt::Display) -> Self {
+        self.message = format!("{place}: {}", self.message);
+        self
+    }
+
     /// Names the 1-based line.
     pub fn at_line(mut self, line: usize) -> Self {
         self.position.get_or_insert((line, None));

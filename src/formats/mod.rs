@@ -1,6 +1,7 @@
 //! Files in and pictures out. Readers return plain scene data; nothing here knows how rays are traced.
 
 pub mod atomic_file;
+pub mod gltf;
 pub mod image_file;
 pub mod ledger;
 pub mod obj;

@@ -1,0 +1,186 @@
+//! Images, each decoded once, and the textures that read them.
+
+use std::collections::{BTreeSet, HashMap};
+use std::path::Path;
+
+use ::gltf::json::texture::{MagFilter, WrappingMode};
+use ::gltf::json::validation::Checked;
+use ::gltf::json::{self, Index, Root, texture};
+use glam::{DVec2, Vec4};
+use rayon::prelude::*;
+
+use super::buffers::Buffers;
+use super::uri::{self, Target};
+use crate::error::{Error, Result};
+use crate::formats::image_file::{decode_texture, read_texture};
+use crate::formats::{Ledger, Treatment};
+use crate::scene::texture::{Filter, Texels, Wrap, srgb_to_linear};
+use crate::scene::{Rgb, Texture, TextureRef};
+
+/// The images of a file and the textures made of them so far.
+#[derive(Debug)]
+pub(super) struct Textures<'a> {
+    root: &'a Root,
+    /// By image number; `None` where it was not asked for or could not be read.
+    images: Vec<Option<Texture>>,
+    /// What materials refer to, in order of first use.
+    made: Vec<Texture>,
+    /// From a texture's number in the file to its place in `made`.
+    places: HashMap<usize, u32>,
+    means: HashMap<usize, Mean>,
+}
+
+/// The mean of an image.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Mean {
+    /// Of the colours, linear.
+    pub color: Rgb,
+    /// Of the stored values, each from 0 to 1, not decoded: for images that hold numbers. Alpha is 1 without alpha.
+    pub values: Vec4,
+}
+
+impl<'a> Textures<'a> {
+    /// Decodes the images behind the textures that are `wanted`, each once, on all threads. What cannot be read goes
+    /// to the ledger, and materials do without it.
+    pub fn decode(
+        root: &'a Root,
+        buffers: &Buffers,
+        folder: &Path,
+        wanted: impl Iterator<Item = Index<json::Texture>>,
+        ledger: &mut Ledger,
+    ) -> Self {
+        let numbers: BTreeSet<usize> = wanted.filter_map(|texture| image_of(root, texture)).collect();
+        let numbers: Vec<usize> = numbers.into_iter().collect();
+        let decoded: Vec<Result<Texture>> =
+            numbers.par_iter().map(|&number| decode(root, buffers, folder, number)).collect();
+        let mut images = vec![None; root.images.len()];
+        for (number, outcome) in numbers.into_iter().zip(decoded) {
+            match outcome {
+                Ok(texture) => images[number] = Some(texture),
+                Err(error) => {
+                    let text = format!("images[{number}]: {}: plain colour used", error.message());
+                    ledger.note(Treatment::Warning, text, 1);
+                }
+            }
+        }
+        Self { root, images, made: Vec::new(), places: HashMap::new(), means: HashMap::new() }
+    }
+
+    /// How a material refers to a texture, its transform included; `None` if its image could not be read.
+    pub fn refer(&mut self, info: &texture::Info, ledger: &mut Ledger) -> Option<TextureRef> {
+        let number = info.index.value();
+        let place = match self.places.get(&number) {
+            Some(&place) => place,
+            None => {
+                let image = self.images[image_of(self.root, info.index)?].as_ref()?;
+                let place = u32::try_from(self.made.len()).ok()?;
+                self.made.push(sampled(self.root, number, image));
+                self.places.insert(number, place);
+                place
+            }
+        };
+        Some(transformed(place, info, ledger))
+    }
+
+    /// The mean of a texture's image; `None` if it could not be read.
+    pub fn mean(&mut self, texture: Index<json::Texture>) -> Option<Mean> {
+        let number = image_of(self.root, texture)?;
+        let image = self.images[number].as_ref()?;
+        Some(*self.means.entry(number).or_insert_with(|| mean(image)))
+    }
+
+    /// The textures that materials refer to.
+    pub fn into_textures(self) -> Vec<Texture> {
+        self.made
+    }
+}
+
+/// The texture coordinate set that a texture reads.
+pub(super) fn uv_set(info: &texture::Info) -> u32 {
+    let transform = info.extensions.as_ref().and_then(|extensions| extensions.texture_transform.as_ref());
+    transform.and_then(|transform| transform.tex_coord).unwrap_or(info.tex_coord)
+}
+
+/// The image of a texture: its own, or the WebP that EXT_texture_webp names instead.
+fn image_of(root: &Root, texture: Index<json::Texture>) -> Option<usize> {
+    let texture = root.textures.get(texture.value())?;
+    let webp = || {
+        let extension = texture.extensions.as_ref()?.others.get("EXT_texture_webp")?;
+        usize::try_from(extension.get("source")?.as_u64()?).ok()
+    };
+    let exists = |number: &usize| *number < root.images.len();
+    Some(texture.source.value()).filter(exists).or_else(|| webp().filter(exists))
+}
+
+fn decode(root: &Root, buffers: &Buffers, folder: &Path, number: usize) -> Result<Texture> {
+    let image = &root.images[number];
+    let name = image.name.clone().unwrap_or_else(|| format!("image {number}"));
+    match (&image.uri, image.buffer_view) {
+        (Some(uri), _) => match uri::resolve(uri, folder)? {
+            Target::Data(bytes) => decode_texture(&bytes, &name),
+            Target::File(path) if path.is_file() => read_texture(&path),
+            Target::File(path) => Err(Error::file(format!("`{}` is missing", path.display()))),
+        },
+        (None, Some(view)) => decode_texture(buffers.view(root, view)?, &name),
+        (None, None) => Err(Error::file("has neither uri nor bufferView")),
+    }
+}
+
+/// The image as a texture's sampler reads it. There are no smaller levels here, so that `minFilter` plays no part.
+fn sampled(root: &Root, texture: usize, image: &Texture) -> Texture {
+    let sampler = root.textures[texture].sampler.and_then(|sampler| root.samplers.get(sampler.value()));
+    let wrap = |mode: Option<Checked<WrappingMode>>| match mode {
+        Some(Checked::Valid(WrappingMode::ClampToEdge)) => Wrap::Clamp,
+        Some(Checked::Valid(WrappingMode::MirroredRepeat)) => Wrap::Mirror,
+        _ => Wrap::Repeat,
+    };
+    let filter = match sampler.and_then(|sampler| sampler.mag_filter) {
+        Some(Checked::Valid(MagFilter::Nearest)) => Filter::Nearest,
+        _ => Filter::Linear,
+    };
+    let wrap = [wrap(sampler.map(|sampler| sampler.wrap_s)), wrap(sampler.map(|sampler| sampler.wrap_t))];
+    Texture { wrap, filter, ..image.clone() }
+}
+
+/// KHR_texture_transform for coordinates whose v goes up: `v' = s v + o` with v down is `s v + (1 - s - o)` with v up.
+fn transformed(place: u32, info: &texture::Info, ledger: &mut Ledger) -> TextureRef {
+    let transform = info.extensions.as_ref().and_then(|extensions| extensions.texture_transform.as_ref());
+    let Some(transform) = transform else { return TextureRef::new(place) };
+    if transform.rotation.0 != 0.0 {
+        ledger.note(Treatment::Approximated, "KHR_texture_transform: rotation left out", 1);
+    }
+    let scale = DVec2::from(transform.scale.0.map(f64::from));
+    let offset = DVec2::from(transform.offset.0.map(f64::from));
+    TextureRef { texture: place, scale, offset: DVec2::new(offset.x, 1.0 - scale.y - offset.y) }
+}
+
+fn mean(image: &Texture) -> Mean {
+    match &image.texels {
+        Texels::Srgb8(texels) => {
+            // Counting the 256 values of each channel makes the sum exact and the curve cheap.
+            let mut counts = [[0u64; 256]; 4];
+            for texel in texels.iter() {
+                for (channel, &byte) in counts.iter_mut().zip(texel) {
+                    channel[usize::from(byte)] += 1;
+                }
+            }
+            let average = |channel: usize, value: fn(f64) -> f64| -> f32 {
+                let sum: f64 = (0u8..=255)
+                    .map(|byte| counts[channel][usize::from(byte)] as f64 * value(f64::from(byte) / 255.0))
+                    .sum();
+                (sum / texels.len() as f64) as f32
+            };
+            Mean {
+                color: Rgb::from_array(std::array::from_fn(|channel| average(channel, srgb_to_linear))),
+                values: Vec4::from_array(std::array::from_fn(|channel| average(channel, |value| value))),
+            }
+        }
+        Texels::Linear32(texels) => {
+            let sum = texels.iter().fold([0.0f64; 3], |sum, texel| {
+                std::array::from_fn(|channel| sum[channel] + f64::from(texel[channel]))
+            });
+            let color = Rgb::from_array(sum.map(|sum| (sum / texels.len() as f64) as f32));
+            Mean { color, values: color.extend(1.0) }
+        }
+    }
+}

@@ -1,0 +1,106 @@
+//! The node hierarchy: where everything stands, in f64.
+
+use ::gltf::json::{Index, Node, Root};
+use glam::{DAffine3, DMat3, DQuat, DVec3, DVec4};
+
+use super::document::{Document, Placement};
+use crate::error::{Error, Result};
+use crate::formats::{Ledger, Treatment, UpAxis};
+
+/// A node of the scene with its place in the world.
+#[derive(Debug)]
+pub(super) struct PlacedNode<'a> {
+    /// Its number in the file.
+    pub number: usize,
+    /// The node.
+    pub node: &'a Node,
+    /// From the node's space to the world.
+    pub to_world: DAffine3,
+}
+
+impl PlacedNode<'_> {
+    /// The name in the file, or one made from the number.
+    pub fn name(&self) -> String {
+        self.node.name.clone().unwrap_or_else(|| format!("node {}", self.number))
+    }
+}
+
+/// All nodes of the default scene, or of the first, or of the file if it has no scenes; parents before children, in
+/// the order of the file's lists.
+///
+/// # Errors
+/// A file's error that names a node which has two parents or is its own ancestor.
+pub(super) fn place<'a>(document: &'a Document, up: UpAxis, ledger: &mut Ledger) -> Result<Vec<PlacedNode<'a>>> {
+    let root = &document.root;
+    let mut seen = vec![false; root.nodes.len()];
+    let mut placed = Vec::with_capacity(root.nodes.len());
+    // A stack of our own: a hierarchy may be deeper than the program's.
+    let mut waiting: Vec<(Index<Node>, DAffine3)> =
+        roots(root).into_iter().rev().map(|node| (node, turn(up))).collect();
+    while let Some((index, parent)) = waiting.pop() {
+        let number = index.value();
+        if std::mem::replace(&mut seen[number], true) {
+            let text = format!("nodes[{number}] has two parents, or is its own ancestor");
+            return Err(Error::file(text).remedy("glTF wants a tree: export the file again"));
+        }
+        let (node, placement) = (&root.nodes[number], &document.placements[number]);
+        let to_world = parent * local(placement, ledger);
+        waiting.extend(node.children.iter().flatten().rev().map(|&child| (child, to_world)));
+        placed.push(PlacedNode { number, node, to_world });
+    }
+    Ok(placed)
+}
+
+/// Where to start.
+fn roots(root: &Root) -> Vec<Index<Node>> {
+    let scene = match root.scene {
+        Some(scene) => root.scenes.get(scene.value()),
+        None => root.scenes.first(),
+    };
+    if let Some(scene) = scene {
+        return scene.nodes.clone();
+    }
+    let mut is_child = vec![false; root.nodes.len()];
+    for child in root.nodes.iter().flat_map(|node| node.children.iter().flatten()) {
+        is_child[child.value()] = true;
+    }
+    (0..root.nodes.len()).filter(|&number| !is_child[number]).map(|number| Index::new(number as u32)).collect()
+}
+
+/// The rotation that makes the up axis +Y, exact.
+fn turn(up: UpAxis) -> DAffine3 {
+    match up {
+        UpAxis::Y => DAffine3::IDENTITY,
+        UpAxis::Z => DAffine3::from_mat3(DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y)),
+    }
+}
+
+/// From the node's space to its parent's. The last row of a matrix, which glTF demands to be 0 0 0 1, is not read.
+fn local(placement: &Placement, ledger: &mut Ledger) -> DAffine3 {
+    if let Some(m) = &placement.matrix {
+        let column = |i: usize| DVec3::new(m[4 * i], m[4 * i + 1], m[4 * i + 2]);
+        return DAffine3 { matrix3: DMat3::from_cols(column(0), column(1), column(2)), translation: column(3) };
+    }
+    let rotation = DVec4::from(placement.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]));
+    compose(
+        DVec3::from(placement.translation.unwrap_or([0.0; 3])),
+        rotation,
+        DVec3::from(placement.scale.unwrap_or([1.0; 3])),
+        ledger,
+    )
+}
+
+/// Scale, then rotation by a quaternion (scalar last, of any length), then translation.
+pub(super) fn compose(translation: DVec3, rotation: DVec4, scale: DVec3, ledger: &mut Ledger) -> DAffine3 {
+    let length =
+        (rotation.x * rotation.x + rotation.y * rotation.y + rotation.z * rotation.z + rotation.w * rotation.w).sqrt();
+    let unit = if length > 0.0 && length < f64::INFINITY {
+        DQuat::from_vec4(rotation / length)
+    } else {
+        ledger.note(Treatment::Warning, "rotation by a quaternion of length 0: not rotated", 1);
+        DQuat::IDENTITY
+    };
+    let r = DMat3::from_quat(unit);
+    let matrix3 = DMat3::from_cols(r.x_axis * scale.x, r.y_axis * scale.y, r.z_axis * scale.z);
+    DAffine3 { matrix3, translation }
+}
