@@ -447,8 +447,8 @@ fn rounding(origin: DVec3, position: DVec3) -> f64 {
 
 /// Eigenvalues and unit eigenvectors of a symmetric 3x3 matrix (cyclic Jacobi, Golub and Van Loan 8.5).
 fn eigen(diagonal: DVec3, off: DVec3) -> (DVec3, [DVec3; 3]) {
-    let mut m = [[diagonal.x, off.x, off.z], [off.x, diagonal.y, off.y], [off.z, off.y, diagonal.z]];
-    let mut v = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let mut m: [[f64; 3]; 3] = [[diagonal.x, off.x, off.z], [off.x, diagonal.y, off.y], [off.z, off.y, diagonal.z]];
+    let mut v: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     // Convergence is quadratic: 3x3 matrices are diagonal to the last bit after five or six sweeps.
     for _ in 0..12 {
         for (p, q) in [(0, 1), (0, 2), (1, 2)] {
@@ -459,18 +459,12 @@ fn eigen(diagonal: DVec3, off: DVec3) -> (DVec3, [DVec3; 3]) {
             let t = 1f64.copysign(theta) / (theta.abs() + (theta * theta + 1.0).sqrt());
             let c = 1.0 / (t * t + 1.0).sqrt();
             let s = t * c;
-            for k in 0..3 {
-                let (kp, kq) = (m[k][p], m[k][q]);
-                (m[k][p], m[k][q]) = (c * kp - s * kq, s * kp + c * kq);
+            for row in m.iter_mut().chain(&mut v) {
+                (row[p], row[q]) = (c * row[p] - s * row[q], s * row[p] + c * row[q]);
             }
-            for k in 0..3 {
-                let (pk, qk) = (m[p][k], m[q][k]);
-                (m[p][k], m[q][k]) = (c * pk - s * qk, s * pk + c * qk);
-            }
-            for row in &mut v {
-                let (kp, kq) = (row[p], row[q]);
-                (row[p], row[q]) = (c * kp - s * kq, s * kp + c * kq);
-            }
+            let (old_p, old_q) = (m[p], m[q]);
+            m[p] = std::array::from_fn(|k| c * old_p[k] - s * old_q[k]);
+            m[q] = std::array::from_fn(|k| s * old_p[k] + c * old_q[k]);
             (m[p][q], m[q][p]) = (0.0, 0.0);
         }
     }

@@ -26,7 +26,7 @@ impl Transform {
         let yz = cross(y, z);
         let determinant = dot(x, yz);
         let singular = || Error::caller("the transform is singular or not finite").remedy("scales must not be 0");
-        if !to_world.is_finite() || !(determinant.abs() > 0.0 && determinant.abs() < f64::INFINITY) {
+        if !(to_world.is_finite() && determinant.abs() > 0.0 && determinant.abs() < f64::INFINITY) {
             return Err(singular());
         }
         let inverse =

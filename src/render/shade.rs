@@ -111,7 +111,7 @@ fn direct(material: &Material, diffuse: Rgb, point: &SurfacePoint, view: &ViewRa
 /// exceed 1 by rounding.
 fn highlight(x: f64, n: f32) -> f64 {
     let x = x.min(1.0);
-    if n >= 0.0 && n <= 65536.0 && n.fract() == 0.0 {
+    if (0.0..=65536.0).contains(&n) && n.fract() == 0.0 {
         let (mut base, mut exponent, mut product) = (x, n as u32, 1.0);
         while exponent > 0 {
             if exponent & 1 == 1 {

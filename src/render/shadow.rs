@@ -62,7 +62,7 @@ fn cone(cosine: f64, inner_angle: f64, outer_angle: f64) -> Option<f64> {
         return Some(1.0);
     }
     let share = (cosine - outer) / (inner - outer);
-    (share > 0.0).then(|| share * share)
+    (share > 0.0).then_some(share * share)
 }
 
 impl<I: Intersect> Tracer<'_, I> {
