@@ -4,6 +4,7 @@
 //! transcendental functions come from the crate `libm`, which is pure Rust.
 
 pub mod float;
+pub mod origin;
 pub mod quadratic;
 pub mod random;
 pub mod transform;

@@ -8,6 +8,7 @@ pub mod light;
 pub mod material;
 pub mod needs;
 pub mod object;
+pub mod origin;
 pub mod texture;
 
 pub use background::Background;

@@ -5,13 +5,13 @@ use std::iter::repeat_n;
 
 use glam::{DVec3, Vec2, Vec3};
 
-use super::origin::choose_origin;
 use super::parse::{ABSENT, Parsed};
 use super::triangulate::Triangulator;
 use crate::error::Result;
 use crate::formats::NormalMode;
 use crate::geometry::TriangleMesh;
 use crate::geometry::mesh::Materials;
+use crate::math::origin::choose_origin;
 use crate::progress::Progress;
 
 /// How many faces are cut between two looks at whether to go on.

@@ -23,7 +23,6 @@ mod library;
 mod lines;
 mod mesh;
 mod mtl;
-mod origin;
 mod parse;
 mod textures;
 mod triangulate;

@@ -12,7 +12,7 @@ use glam::DVec3;
 ///   which is at least `g / 2^23`, so their difference is a multiple of that spacing and below 2^24 times it.
 ///
 /// Values that are not finite have no say.
-pub(super) fn choose_origin(positions: &[DVec3]) -> DVec3 {
+pub fn choose_origin(positions: &[DVec3]) -> DVec3 {
     DVec3::from_array(std::array::from_fn(|axis| choose(positions.iter().map(|p| p[axis]))))
 }
 
