@@ -16,7 +16,7 @@
 //! without a line; a corner that lacks a normal in a mesh that has some shifts the normals of all corners after it; and
 //! positions pass through f32. It also keeps 104 bytes a face and a `String` a line. What is left for it to do is to
 //! read again what was read already, so the statements are read here once. For libraries, where the cost does not
-//! matter and each value can be checked before tobj sees it, it does the reading: [`library`].
+//! matter and each value can be checked before tobj sees it, it does the reading (`library.rs`).
 
 mod find_file;
 mod library;

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, HashMap};
 use glam::{DVec3, Vec2, Vec3};
 
 use super::lines::Statement;
+use super::triangulate::MOST_CORNERS;
 use crate::error::{Error, Result};
 use crate::formats::{Ledger, Treatment};
 
@@ -233,7 +234,9 @@ impl Parsed {
             }
         };
         let outside = self.faces.positions.iter().filter(|&&number| number as usize >= self.positions.len()).count();
+        let huge = self.faces.corner_counts.iter().filter(|&&corners| corners as usize > MOST_CORNERS).count();
         note(Treatment::Honoured, "faces (f)", self.faces.count as u64);
+        note(Treatment::Approximated, "face with more than 65536 corners: cut as if it were convex", huge as u64);
         note(Treatment::Ignored, "vertex colours (v with 6 numbers or more)", self.counts.colors);
         note(Treatment::Ignored, "vertex weights (v with 4 numbers)", self.counts.weights);
         note(Treatment::Warning, "face with fewer than 3 corners: left out", self.counts.small_faces);
@@ -373,6 +376,17 @@ mod tests {
             assert_eq!(message(&format!("f 1 2 {corner}")), format!("`{corner}` is not a corner of a face"));
         }
         assert!(message(&format!("v {} 0 0", "é".repeat(100))).len() < 120);
+    }
+
+    #[test]
+    fn faces_too_large_to_cut_well_are_in_the_ledger() {
+        let mut ledger = Ledger::default();
+        let parse = |corners| parse(&format!("v 0 0 0\nf{}", " 1".repeat(corners))).unwrap();
+        parse(MOST_CORNERS).finish(&mut ledger);
+        assert!(ledger.entries().all(|entry| entry.0 == Treatment::Honoured));
+        parse(MOST_CORNERS + 1).finish(&mut ledger);
+        let note = format!("face with more than {MOST_CORNERS} corners: cut as if it were convex");
+        assert!(ledger.entries().any(|entry| entry == (Treatment::Approximated, note.as_str(), 1)));
     }
 
     #[test]

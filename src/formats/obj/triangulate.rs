@@ -7,8 +7,9 @@ use glam::DVec3;
 
 use crate::math::vector::cross;
 
-/// Polygons with more corners are cut into a fan: earcut counts bytes of its nodes in 32 bits.
-const MOST_CORNERS: usize = 1 << 24;
+/// Polygons with more corners are cut into a fan. Ear clipping takes time between n log n and n^2: some seconds for a
+/// polygon of this size that crosses itself everywhere, measured on random corners.
+pub(super) const MOST_CORNERS: usize = 1 << 16;
 
 /// Cuts polygons of n corners into n - 2 triangles, always, so that the number of a triangle depends on the counts of
 /// corners alone.
