@@ -7,8 +7,12 @@ use std::path::Path;
 
 use ::gltf::json::{Index, Root, buffer};
 
+use super::document::missing_extension;
 use super::uri::{self, Target};
 use crate::error::{Error, Fault, Result};
+
+/// Extensions whose views have uncompressed bytes only where the file was made to have them.
+const MESHOPT: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
 
 /// All buffers of a file, loaded.
 #[derive(Debug)]
@@ -73,6 +77,12 @@ impl<'a> Buffers<'a> {
             .bytes
             .get(buffer)
             .ok_or_else(|| Error::file(format!("bufferViews[{number}].buffer: buffers[{buffer}] does not exist")))?;
+        let compressed = view.extensions.as_ref().and_then(|extensions| {
+            MESHOPT.into_iter().find(|name| bytes.is_empty() && extensions.others.contains_key(*name))
+        });
+        if let Some(name) = compressed {
+            return Err(missing_extension(name).within(format_args!("bufferViews[{number}]")));
+        }
         let start = view.byte_offset.unwrap_or_default().0;
         let beyond = || {
             let (length, have) = (view.byte_length.0, bytes.len());

@@ -27,14 +27,14 @@ pub(super) fn read(root: &Root, placed: &PlacedNode, ledger: &mut Ledger) -> Opt
         }
         _ => None,
     };
-    let usable = position.is_finite();
-    let Some(kind) = kind.filter(|_| usable) else {
-        ledger.note(Treatment::Warning, "light at a node without a direction or place: left out", 1);
+    let color = Rgb::from_array(light.color) * light.intensity;
+    let Some(kind) = kind.filter(|_| position.is_finite() && color.is_finite()) else {
+        ledger.note(Treatment::Warning, "light without a direction, or with numbers out of range: left out", 1);
         return None;
     };
     if light.range.is_some() {
         ledger.note(Treatment::Ignored, "range of a light", 1);
     }
     let name = light.name.clone().unwrap_or_else(|| format!("light {}", index.value()));
-    Some(Light { name, kind, color: Rgb::from_array(light.color) * light.intensity })
+    Some(Light { name, kind, color })
 }

@@ -9,27 +9,32 @@ use super::phong::Surface;
 use crate::formats::{Ledger, Treatment};
 use crate::scene::{Material, Rgb};
 
-/// Reads a material.
+/// Reads a material. One whose numbers overflow becomes the neutral one, with a warning.
 pub(super) fn read(number: usize, source: &Source, textures: &mut Textures, ledger: &mut Ledger) -> Material {
     let name = source.name.clone().unwrap_or_else(|| format!("material {number}"));
     note_unread_parts(source, ledger);
-    let emission = emission(source, textures, ledger);
-    if is_unlit(source) {
-        return unlit(name, source, textures, ledger);
+    let material = if is_unlit(source) { unlit(source, textures, ledger) } else { shaded(source, textures, ledger) };
+    let colors = [material.emission, material.diffuse, material.specular, material.ks, material.kr, material.kt];
+    if colors.iter().all(|color| color.is_finite()) && material.ior.is_finite() {
+        return Material { name, ..material };
     }
-    let base = base_texture(source);
+    ledger.note(Treatment::Warning, "material with numbers out of range: neutral material used", 1);
+    Material { name, ..Material::default() }
+}
+
+fn shaded(source: &Source, textures: &mut Textures, ledger: &mut Ledger) -> Material {
+    let emission = emission(source, textures, ledger);
     let (mut surface, ior) = match specular_glossiness(source) {
         Some(_) => (from_specular_glossiness(source, textures, ledger), 1.5),
         None => from_metallic_roughness(source, textures, ledger),
     };
-    surface.alpha = alpha(source, ledger);
+    surface.alpha = alpha(source, textures, ledger);
     // What is blended, and what is thin, lets rays through unbent.
-    let bends = surface.alpha == 1.0 && is_solid(source, ledger);
+    let bends = is_solid(source, ledger) && surface.alpha == 1.0 && ior >= 1.0;
     Material {
-        name,
         emission: emission * surface.alpha,
-        diffuse_texture: base.and_then(|info| textures.refer(info, ledger)),
-        ior: if bends && ior >= 1.0 { ior } else { 1.0 },
+        diffuse_texture: base_texture(source).and_then(|info| textures.refer(info, ledger)),
+        ior: if bends { ior } else { 1.0 },
         ..surface.phong()
     }
 }
@@ -152,22 +157,23 @@ fn is_unlit(source: &Source) -> bool {
 }
 
 /// KHR_materials_unlit: the base colour as it is, whatever the lights. Emission has no texture here.
-fn unlit(name: String, source: &Source, textures: &mut Textures, ledger: &mut Ledger) -> Material {
+fn unlit(source: &Source, textures: &mut Textures, ledger: &mut Ledger) -> Material {
     if base_texture(source).is_some() {
         ledger.note(Treatment::Approximated, "KHR_materials_unlit: the mean of the base texture is emitted", 1);
     }
-    let kt = Rgb::splat(1.0 - alpha(source, ledger));
+    let kt = Rgb::splat(1.0 - alpha(source, textures, ledger));
     let emission = base_color(source, textures).1 * (Rgb::ONE - kt);
-    Material { name, ambient: Some(Rgb::ZERO), emission, diffuse: Rgb::ZERO, kt, ior: 1.0, ..Material::default() }
+    Material { ambient: Some(Rgb::ZERO), emission, diffuse: Rgb::ZERO, kt, ior: 1.0, ..Material::default() }
 }
 
 /// How much of the surface is there.
-fn alpha(source: &Source, ledger: &mut Ledger) -> f32 {
+fn alpha(source: &Source, textures: &mut Textures, ledger: &mut Ledger) -> f32 {
     match source.alpha_mode {
         Checked::Valid(AlphaMode::Blend) => {
-            let treatment = Treatment::Approximated;
-            ledger.note(treatment, "alphaMode BLEND: the factor's alpha is used, a texture's is not", 1);
-            base_factor(source)[3].clamp(0.0, 1.0)
+            let mean = base_texture(source).and_then(|info| textures.mean(info.index));
+            let treatment = if mean.is_some() { Treatment::Approximated } else { Treatment::Honoured };
+            ledger.note(treatment, "alphaMode BLEND: the mean of a texture's alpha is used", 1);
+            (base_factor(source)[3] * mean.map_or(1.0, |mean| mean.values.w)).clamp(0.0, 1.0)
         }
         Checked::Valid(AlphaMode::Mask) => {
             ledger.note(Treatment::Ignored, "alphaMode MASK", 1);

@@ -39,6 +39,7 @@ use crate::progress::Progress;
 use crate::scene::{Object, Shape};
 use budget::Budget;
 use buffers::Buffers;
+use cameras::Cameras;
 use container::Container;
 use document::Document;
 use images::Textures;
@@ -92,12 +93,13 @@ fn read(file: &[u8], folder: &Path, options: &LoadOptions, progress: &dyn Progre
         normals: options.normals,
     };
     let places = read_meshes(&reader, &placed, &mut model, &mut budget, &mut ledger, progress)?;
+    let mut cameras = Cameras::default();
     for node in &placed {
         place_objects(root, &buffers, node, &places, &mut model, &mut budget, &mut ledger)?;
-        let camera = cameras::read(root, node, &model.cameras, &mut ledger);
-        model.cameras.extend(camera);
+        cameras.add(root, node, &mut ledger);
         model.lights.extend(lights::read(root, node, &mut ledger));
     }
+    model.cameras = cameras.into_list();
     model.physical_lights = !model.lights.is_empty();
     model.ledger = ledger;
     Ok(model)

@@ -1,0 +1,136 @@
+//! Materials, textures and images.
+
+use glam::{DVec2, Vec2};
+use serde_json::json;
+
+use super::super::uri::{Target, resolve};
+use super::*;
+use crate::scene::Rgb;
+use crate::scene::texture::{Filter, Wrap};
+
+/// A PNG of 2 x 1 texels: pure red and black.
+const RED_BLACK: &str = "data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAIAAAABCAIAAAB7QOjdAA\
+    AADElEQVR4nGP4zwACAAYBAQB/9VxdAAAAAElFTkSuQmCC";
+
+#[test]
+fn textures_are_decoded_once_and_read_as_their_samplers_say() {
+    let mut file = File::default();
+    let (position, uv) = (file.triangle(), file.floats(&[[0.0, 0.0], [1.0, 0.0], [0.0, 0.25]]));
+    let transform = json!({"KHR_texture_transform": {"scale": [2, 3], "offset": [0.5, 0.25], "texCoord": 1}});
+    let model = file
+        .load(json!({
+            "nodes": [{"mesh": 0}],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": position, "TEXCOORD_1": uv}, "material": 0}]}],
+            "images": [{"uri": RED_BLACK}, {"uri": "missing.png"}],
+            "samplers": [{"wrapS": 33071, "wrapT": 33648, "magFilter": 9728}],
+            "textures": [{"source": 0, "sampler": 0}, {"source": 0}, {"source": 1}],
+            "materials": [
+                {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0, "extensions": transform}}},
+                {"pbrMetallicRoughness": {"baseColorTexture": {"index": 1}}},
+                {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}},
+                {"pbrMetallicRoughness": {"baseColorTexture": {"index": 2}}},
+            ],
+        }))
+        .unwrap();
+    let [first, second] = model.textures.as_slice() else { panic!("{} textures", model.textures.len()) };
+    assert_eq!((first.wrap, first.filter), ([Wrap::Clamp, Wrap::Mirror], Filter::Nearest));
+    assert_eq!((second.wrap, second.filter), ([Wrap::Repeat, Wrap::Repeat], Filter::Linear));
+    let used = |material: usize| model.materials[material].diffuse_texture.map(|used| used.texture);
+    assert_eq!([used(0), used(1), used(2), used(3)], [Some(0), Some(1), Some(0), None]);
+    assert!(has_note(&model, Treatment::Warning, "images[1]"));
+
+    // The texel that glTF reads at (u, v) is the one that we read at our coordinates.
+    let mesh = &model.meshes[0];
+    assert_eq!(mesh.uvs.as_deref().unwrap()[2], Vec2::new(0.0, 0.75));
+    let reference = model.materials[0].diffuse_texture.unwrap();
+    let ours = mesh.uvs.as_deref().unwrap()[2].as_dvec2() * reference.scale + reference.offset;
+    let theirs = DVec2::new(0.0, 0.25) * DVec2::new(2.0, 3.0) + DVec2::new(0.5, 0.25);
+    assert_eq!(ours, DVec2::new(theirs.x, 1.0 - theirs.y));
+}
+
+#[test]
+fn images_may_lie_in_a_buffer() {
+    let mut file = File::default();
+    let position = file.triangle();
+    let Target::Data(png) = resolve(RED_BLACK, Path::new("")).unwrap() else { panic!() };
+    let view = file.view(&png);
+    let mut rest = one(json!({"attributes": {"POSITION": position}, "material": 0}));
+    rest["images"] = json!([{"bufferView": view, "mimeType": "image/png"}]);
+    rest["textures"] = json!([{"source": 0}]);
+    rest["materials"] = json!([{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]);
+    let model = file.load(rest).unwrap();
+    let texture = &model.textures[0];
+    assert_eq!((texture.width, texture.height), (2, 1));
+    assert_eq!(texture.sample(DVec2::new(0.25, 0.5)), Rgb::X);
+    // Half red, half black: the mean reflectance of the metal.
+    let smooth = &model.materials[0];
+    assert_eq!(smooth.specular, Rgb::X);
+}
+
+#[test]
+fn data_textures_act_by_their_mean() {
+    let mut file = File::default();
+    let position = file.triangle();
+    let mut rest = one(json!({"attributes": {"POSITION": position}, "material": 0}));
+    rest["images"] = json!([{"uri": RED_BLACK}]);
+    rest["textures"] = json!([{"source": 0}]);
+    rest["materials"] = json!([{"pbrMetallicRoughness": {"metallicRoughnessTexture": {"index": 0}},
+        "emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 0}}]);
+    let model = file.load(rest).unwrap();
+    let material = &model.materials[0];
+    // Green and blue are 0: perfectly smooth and no metal.
+    assert!((material.kr - 0.04).abs().max_element() < 1e-6 && material.diffuse == Rgb::ONE);
+    assert_eq!(material.emission, Rgb::X * 0.5);
+}
+
+#[test]
+fn material_extensions_become_phong_terms() {
+    let extension = |name: &str, value: Value, metallic: f32| {
+        with_material(json!({"pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.25, 1, 1], "metallicFactor": metallic,
+            "roughnessFactor": 0}, "emissiveFactor": [0.5, 0, 0], "extensions": {name: value}}))
+        .materials
+        .remove(0)
+    };
+    let base = Rgb::new(0.5, 0.25, 1.0);
+    let unlit = extension("KHR_materials_unlit", json!({}), 0.0);
+    assert_eq!((unlit.emission, unlit.diffuse, unlit.ambient), (base, Rgb::ZERO, Some(Rgb::ZERO)));
+    let bright = extension("KHR_materials_emissive_strength", json!({"emissiveStrength": 6}), 0.0);
+    assert_eq!(bright.emission, Rgb::X * 3.0);
+    let diamond = extension("KHR_materials_ior", json!({"ior": 2.0}), 0.0);
+    assert!((diamond.kr - 1.0 / 9.0).abs().max_element() < 1e-7);
+    let tinted = json!({"specularFactor": 0.5, "specularColorFactor": [1, 4, 100]});
+    let tinted = extension("KHR_materials_specular", tinted, 0.0);
+    assert!((tinted.kr - Rgb::new(0.02, 0.08, 0.5)).abs().max_element() < 1e-6);
+    let glass = extension("KHR_materials_transmission", json!({"transmissionFactor": 1}), 0.0);
+    assert!((glass.kt - 0.96 * base).abs().max_element() < 1e-6 && glass.diffuse == Rgb::ZERO);
+    assert_eq!(glass.ior, 1.0, "without a volume it is a thin wall");
+    let shiny = json!({"diffuseFactor": [1, 1, 1, 1], "specularFactor": [0.5, 0, 0], "glossinessFactor": 1});
+    let shiny = extension("KHR_materials_pbrSpecularGlossiness", shiny, 0.0);
+    assert_eq!((shiny.kr, shiny.diffuse), (Rgb::X * 0.5, Rgb::splat(0.5)));
+    assert_eq!(extension("KHR_materials_ior", json!({}), 1.0).kr, base, "a metal mirrors its colour");
+
+    let solid = with_material(json!({"pbrMetallicRoughness": {"metallicFactor": 0}, "extensions": {
+        "KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_volume": {"thicknessFactor": 1},
+        "KHR_materials_ior": {"ior": 1.4}}}));
+    assert!((solid.materials[0].ior - 1.4).abs() < 1e-6);
+    let blend =
+        with_material(json!({"alphaMode": "BLEND", "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.25]}}));
+    assert_eq!((blend.materials[0].kt, blend.materials[0].ior), (Rgb::splat(0.75), 1.0));
+    assert!(has_note(&blend, Treatment::Approximated, "BLEND"));
+    assert!(has_note(&with_material(json!({"alphaMode": "MASK"})), Treatment::Ignored, "MASK"));
+}
+
+#[test]
+fn a_blend_takes_the_mean_alpha_of_its_texture() {
+    // 2 x 1 texels whose alphas are 255 and 0.
+    let half = "data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAIAAAABCAYAAAD0In+KAA\
+        AADElEQVR4nGP4DwEMACLmBvoI+gInAAAAAElFTkSuQmCC";
+    let mut file = File::default();
+    let position = file.triangle();
+    let mut rest = one(json!({"attributes": {"POSITION": position}, "material": 0}));
+    rest["images"] = json!([{"uri": half}]);
+    rest["textures"] = json!([{"source": 0}]);
+    rest["materials"] = json!([{"alphaMode": "BLEND",
+        "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.5], "baseColorTexture": {"index": 0}}}]);
+    assert_eq!(file.load(rest).unwrap().materials[0].kt, Rgb::splat(0.75));
+}
