@@ -10,6 +10,7 @@ use ::gltf::json::{Index, Root, buffer};
 use super::document::missing_extension;
 use super::uri::{self, Target};
 use crate::error::{Error, Fault, Result};
+use crate::formats::Ledger;
 
 /// Extensions whose views have uncompressed bytes only where the file was made to have them.
 const MESHOPT: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
@@ -26,7 +27,7 @@ impl<'a> Buffers<'a> {
     ///
     /// # Errors
     /// A file's error that names the buffer, where its source is missing or shorter than it says.
-    pub fn read(root: &Root, binary: Option<&'a [u8]>, folder: &Path) -> Result<Self> {
+    pub fn read(root: &Root, binary: Option<&'a [u8]>, folder: &Path, ledger: &mut Ledger) -> Result<Self> {
         let mut bytes = Vec::new();
         for (number, buffer) in root.buffers.iter().enumerate() {
             let in_buffer = |error: Error| {
@@ -37,7 +38,10 @@ impl<'a> Buffers<'a> {
             let source = match (&buffer.uri, binary) {
                 (Some(uri), _) => match uri::resolve(uri, folder).map_err(in_buffer)? {
                     Target::Data(bytes) => Cow::Owned(bytes),
-                    Target::File(path) => Cow::Owned(read_exactly(&path, length).map_err(in_buffer)?),
+                    Target::File(path) => {
+                        ledger.note_file(&path);
+                        Cow::Owned(read_exactly(&path, length).map_err(in_buffer)?)
+                    }
                 },
                 (None, Some(binary)) if number == 0 => Cow::Borrowed(binary),
                 // A buffer without a source is legal: an extension may fill it. Whoever reads from it gets an error.

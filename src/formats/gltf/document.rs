@@ -1,7 +1,5 @@
 //! The JSON: parsed, checked for dangling references, and for what it requires of its reader.
 
-use std::path::Path;
-
 use ::gltf::json::validation::{self, Validate};
 use ::gltf::json::{self, Root, mesh::Semantic, validation::Checked};
 use serde::Deserialize;
@@ -186,9 +184,4 @@ fn judge(path: &str, error: validation::Error) -> Verdict {
         Missing if path.starts_with("textures") && path.ends_with(".source") => Verdict::Harmless,
         _ => Verdict::Fatal,
     }
-}
-
-/// The folder that relative URIs start from.
-pub(super) fn folder_of(path: &Path) -> &Path {
-    path.parent().unwrap_or(Path::new(""))
 }

@@ -1,7 +1,8 @@
 //! Images, each decoded once, and the textures that read them.
 
+use std::borrow::Cow;
 use std::collections::{BTreeSet, HashMap};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use ::gltf::json::texture::{MagFilter, WrappingMode};
 use ::gltf::json::validation::Checked;
@@ -51,10 +52,18 @@ impl<'a> Textures<'a> {
     ) -> Self {
         let numbers: BTreeSet<usize> = wanted.filter_map(|texture| image_of(root, texture)).collect();
         let numbers: Vec<usize> = numbers.into_iter().collect();
-        let decoded: Vec<Result<Texture>> =
-            numbers.par_iter().map(|&number| decode(root, buffers, folder, number)).collect();
+        let read = |&number: &usize| -> (Option<PathBuf>, Result<Texture>) {
+            match find(root, buffers, folder, number) {
+                Ok(source) => (source.path(), source.decode(&image_name(root, number))),
+                Err(error) => (None, Err(error)),
+            }
+        };
+        let outcomes: Vec<_> = numbers.par_iter().map(read).collect();
         let mut images = vec![None; root.images.len()];
-        for (number, outcome) in numbers.into_iter().zip(decoded) {
+        for (number, (path, outcome)) in numbers.into_iter().zip(outcomes) {
+            if let Some(path) = path {
+                ledger.note_file(&path);
+            }
             match outcome {
                 Ok(texture) => images[number] = Some(texture),
                 Err(error) => {
@@ -112,18 +121,44 @@ fn image_of(root: &Root, texture: Index<json::Texture>) -> Option<usize> {
     Some(texture.source.value()).filter(exists).or_else(|| webp().filter(exists))
 }
 
-fn decode(root: &Root, buffers: &Buffers, folder: &Path, number: usize) -> Result<Texture> {
+/// Where an image's bytes are.
+enum Source<'a> {
+    File(PathBuf),
+    Data(Cow<'a, [u8]>),
+}
+
+fn find<'a>(root: &Root, buffers: &'a Buffers, folder: &Path, number: usize) -> Result<Source<'a>> {
     let image = &root.images[number];
-    let name = image.name.clone().unwrap_or_else(|| format!("image {number}"));
     match (&image.uri, image.buffer_view) {
         (Some(uri), _) => match uri::resolve(uri, folder)? {
-            Target::Data(bytes) => decode_texture(&bytes, &name),
-            Target::File(path) if path.is_file() => read_texture(&path),
+            Target::Data(bytes) => Ok(Source::Data(Cow::Owned(bytes))),
+            // A device or pipe may never end.
+            Target::File(path) if path.is_file() => Ok(Source::File(path)),
             Target::File(path) => Err(Error::file(format!("`{}` is missing", path.display()))),
         },
-        (None, Some(view)) => decode_texture(buffers.view(root, view)?, &name),
+        (None, Some(view)) => Ok(Source::Data(Cow::Borrowed(buffers.view(root, view)?))),
         (None, None) => Err(Error::file("has neither uri nor bufferView")),
     }
+}
+
+impl Source<'_> {
+    fn path(&self) -> Option<PathBuf> {
+        match self {
+            Self::File(path) => Some(path.clone()),
+            Self::Data(_) => None,
+        }
+    }
+
+    fn decode(&self, name: &str) -> Result<Texture> {
+        match self {
+            Self::File(path) => read_texture(path),
+            Self::Data(bytes) => decode_texture(bytes, name),
+        }
+    }
+}
+
+fn image_name(root: &Root, number: usize) -> String {
+    root.images[number].name.clone().unwrap_or_else(|| format!("image {number}"))
 }
 
 /// The image as a texture's sampler reads it. There are no smaller levels here, so that `minFilter` plays no part.

@@ -170,10 +170,14 @@ fn unlit(source: &Source, textures: &mut Textures, ledger: &mut Ledger) -> Mater
 fn alpha(source: &Source, textures: &mut Textures, ledger: &mut Ledger) -> f32 {
     match source.alpha_mode {
         Checked::Valid(AlphaMode::Blend) => {
-            let mean = base_texture(source).and_then(|info| textures.mean(info.index));
-            let treatment = if mean.is_some() { Treatment::Approximated } else { Treatment::Honoured };
-            ledger.note(treatment, "alphaMode BLEND: the mean of a texture's alpha is used", 1);
-            (base_factor(source)[3] * mean.map_or(1.0, |mean| mean.values.w)).clamp(0.0, 1.0)
+            let mean =
+                base_texture(source).and_then(|info| textures.mean(info.index)).map_or(1.0, |mean| mean.values.w);
+            if mean == 1.0 {
+                ledger.note(Treatment::Honoured, "alphaMode BLEND", 1);
+            } else {
+                ledger.note(Treatment::Approximated, "alphaMode BLEND: the mean of the texture's alpha is used", 1);
+            }
+            (base_factor(source)[3] * mean).clamp(0.0, 1.0)
         }
         Checked::Valid(AlphaMode::Mask) => {
             ledger.note(Treatment::Ignored, "alphaMode MASK", 1);

@@ -57,7 +57,10 @@ use nodes::PlacedNode;
 /// out of bounds; unsupported for required extensions that are not read; a limit for what does not fit memory.
 pub fn load(path: &Path, options: &LoadOptions, progress: &dyn Progress) -> Result<Model> {
     let file = std::fs::read(path).map_err(|error| Error::system(path, error))?;
-    read(&file, document::folder_of(path), options, progress).map_err(|error| error.at_path(path))
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut model = read(&file, folder, options, progress).map_err(|error| error.at_path(path))?;
+    model.ledger.note_file(path);
+    Ok(model)
 }
 
 /// Reads a file that is in memory; `folder` is where its relative URIs start from.
@@ -66,7 +69,7 @@ fn read(file: &[u8], folder: &Path, options: &LoadOptions, progress: &dyn Progre
     let container = Container::split(file)?;
     let document = Document::parse(container.json, &mut ledger)?;
     let root = &document.root;
-    let buffers = Buffers::read(root, container.binary, folder)?;
+    let buffers = Buffers::read(root, container.binary, folder, &mut ledger)?;
     let placed = nodes::place(&document, options.up, &mut ledger)?;
     note_unread_parts(root, &placed, &mut ledger);
     progress.check()?;
