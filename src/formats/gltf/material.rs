@@ -29,13 +29,14 @@ fn shaded(source: &Source, textures: &mut Textures, ledger: &mut Ledger) -> Mate
         None => from_metallic_roughness(source, textures, ledger),
     };
     surface.alpha = alpha(source, textures, ledger);
+    let material = surface.phong();
     // What is blended, and what is thin, lets rays through unbent.
-    let bends = is_solid(source, ledger) && surface.alpha == 1.0 && ior >= 1.0;
+    let bends = surface.alpha == 1.0 && is_solid(source, ledger);
     Material {
         emission: emission * surface.alpha,
         diffuse_texture: base_texture(source).and_then(|info| textures.refer(info, ledger)),
-        ior: if bends { ior } else { 1.0 },
-        ..surface.phong()
+        ior: if bends || !material.is_transmissive() { ior.max(1.0) } else { 1.0 },
+        ..material
     }
 }
 

@@ -77,6 +77,7 @@ fn read(file: &[u8], folder: &Path, options: &LoadOptions, progress: &dyn Progre
     let mut model = Model::default();
     let wanted = root.materials.iter().flat_map(material::textures_of);
     let mut textures = Textures::decode(root, &buffers, folder, wanted, &mut ledger);
+    progress.check()?;
     for (number, source) in root.materials.iter().enumerate() {
         model.materials.push(material::read(number, source, &mut textures, &mut ledger));
     }

@@ -39,7 +39,7 @@ impl Surface {
     ///   Refraction"), `2 / alpha^2 - 2`, over 4: theirs is for the half vector, whose angle is half of that between
     ///   the reflected ray and the viewer (Fisher and Woo 1994, "R.E versus N.H specular highlights").
     /// - **Mirror**: `kr = F0 fade`, left out below a threshold. **Transmission**: `kt = transmission tint (1 - F0)`,
-    ///   at most `1 - kr`. Blending takes `1 - alpha` of everything behind.
+    ///   at most `1 - kr`. **Blending** multiplies all of it by `alpha` and adds `1 - alpha` of what lies behind to `kt`.
     pub fn phong(&self) -> Material {
         let roughness = self.roughness.clamp(0.0, 1.0);
         let f0 = self.f0.clamp(Rgb::ZERO, Rgb::ONE);
@@ -51,7 +51,7 @@ impl Surface {
         let height = if strongest > 0.0 { (strongest / (4.0 * width * width)).min(1.0) } else { 0.0 };
         let exponent = (0.5 * (1.0 / (width * width) - 1.0)).clamp(1.0, SHARPEST);
 
-        let mirror = f0 * fade;
+        let mirror = f0 * fade * alpha;
         let kr = if mirror.max_element() < WEAKEST_MIRROR { Rgb::ZERO } else { mirror };
         let through = (self.tint * self.transmission * (Rgb::ONE - f0)).clamp(Rgb::ZERO, Rgb::ONE - kr);
         let diffuse = self.matt * (1.0 - self.transmission) + self.metal * (1.0 - fade);
@@ -66,8 +66,8 @@ impl Surface {
             specular: if strongest > 0.0 { f0 / strongest } else { Rgb::ONE },
             ks: Rgb::splat(height * alpha),
             shininess: exponent,
-            kr: kr * alpha,
-            kt: (through * alpha + Rgb::splat(1.0 - alpha)).min(Rgb::ONE - kr * alpha),
+            kr,
+            kt: (through * alpha + Rgb::splat(1.0 - alpha)).min(Rgb::ONE - kr),
             ..Material::default()
         }
     }

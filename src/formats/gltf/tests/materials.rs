@@ -97,7 +97,7 @@ fn material_extensions_become_phong_terms() {
     let bright = extension("KHR_materials_emissive_strength", json!({"emissiveStrength": 6}), 0.0);
     assert_eq!(bright.emission, Rgb::X * 3.0);
     let diamond = extension("KHR_materials_ior", json!({"ior": 2.0}), 0.0);
-    assert!((diamond.kr - 1.0 / 9.0).abs().max_element() < 1e-7);
+    assert!((diamond.kr - 1.0 / 9.0).abs().max_element() < 1e-7 && diamond.ior == 2.0);
     let tinted = json!({"specularFactor": 0.5, "specularColorFactor": [1, 4, 100]});
     let tinted = extension("KHR_materials_specular", tinted, 0.0);
     assert!((tinted.kr - Rgb::new(0.02, 0.08, 0.5)).abs().max_element() < 1e-6);
