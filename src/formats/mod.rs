@@ -4,20 +4,23 @@ pub mod atomic_file;
 pub mod gltf;
 pub mod image_file;
 pub mod ledger;
+pub mod model;
 pub mod obj;
 pub mod picture;
+pub mod scene_file;
 
+use std::io::Read as _;
 use std::path::Path;
 
-use crate::error::Result;
-use crate::geometry::TriangleMesh;
+use crate::error::{Error, Result};
 use crate::progress::Progress;
-use crate::scene::{Light, Material, NamedCamera, Object, Scene, Texture};
+use crate::scene::{Camera, LightKind, Projection, Scene, auto};
 
 pub use ledger::{Ledger, Treatment};
+pub use model::Model;
 
 /// Which shading normals a mesh gets.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Deserialize, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Deserialize, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum NormalMode {
     /// Those of the file; where it has none, what its format prescribes (flat).
@@ -30,7 +33,7 @@ pub enum NormalMode {
 }
 
 /// Which axis of a model file points up.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Deserialize, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Deserialize, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum UpAxis {
     /// +Y: glTF always, OBJ mostly.
@@ -41,34 +44,12 @@ pub enum UpAxis {
 }
 
 /// How a file is read.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct LoadOptions {
     /// Shading normals of meshes.
     pub normals: NormalMode,
     /// The axis that points up.
     pub up: UpAxis,
-}
-
-/// What a model file holds. Positions in its lists are local to it; [`Material`]s, [`Texture`]s and meshes are appended
-/// to a scene's lists by [`Model::append_to`].
-#[derive(Debug, Clone, Default)]
-pub struct Model {
-    /// Meshes, finished.
-    pub meshes: Vec<TriangleMesh>,
-    /// Materials that meshes refer to; never empty.
-    pub materials: Vec<Material>,
-    /// Images that materials refer to.
-    pub textures: Vec<Texture>,
-    /// Placed meshes, in file order.
-    pub objects: Vec<Object>,
-    /// Cameras, in file order.
-    pub cameras: Vec<NamedCamera>,
-    /// Lights, in file order.
-    pub lights: Vec<Light>,
-    /// Whether the lights are in physical units (candela, lux), so that a picture needs an exposure.
-    pub physical_lights: bool,
-    /// What was honoured, approximated and ignored.
-    pub ledger: Ledger,
 }
 
 /// A scene and how its files were read.
@@ -80,6 +61,17 @@ pub struct Loaded {
     pub ledger: Ledger,
 }
 
+/// Formats that [`open`] reads, for messages.
+const ACCEPTED: &str = "accepted are .toml (scene), .obj, .gltf and .glb (models)";
+
+/// Formats of scenes and models.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Format {
+    Scene,
+    Obj,
+    Gltf,
+}
+
 /// Opens a scene file (`.toml`) or a model (`.obj`, `.gltf`, `.glb`), chosen by suffix and, failing that, by content.
 ///
 /// A model alone becomes a scene with an automatic camera, lights and background.
@@ -87,6 +79,95 @@ pub struct Loaded {
 /// # Errors
 /// Names the file, and line and column where there are such, and what would mend it.
 pub fn open(path: &Path, options: &LoadOptions, progress: &dyn Progress) -> Result<Loaded> {
-    let _ = (path, options, progress);
-    Err(crate::error::Error::unsupported("not yet"))
+    if format_of(path)? == Format::Scene {
+        return scene_file::read(path, options, progress);
+    }
+    let model = load_model(path, options, progress)?;
+    let mut scene = Scene::default();
+    let ledger = model.ledger.clone();
+    model.append_to(&mut scene);
+    hold_angles_in_degrees(&mut scene);
+    auto::complete(&mut scene);
+    Ok(Loaded { scene, ledger })
+}
+
+/// Loads a model file on its own.
+///
+/// # Errors
+/// As [`open`]; a scene file is not a model.
+pub fn load_model(path: &Path, options: &LoadOptions, progress: &dyn Progress) -> Result<Model> {
+    match format_of(path)? {
+        Format::Obj => obj::load(path, options, progress),
+        Format::Gltf => gltf::load(path, options, progress),
+        Format::Scene => Err(Error::unsupported("a scene file cannot be used as a mesh").at_path(path)),
+    }
+}
+
+/// The format by suffix; where that is unknown, by content.
+fn format_of(path: &Path) -> Result<Format> {
+    let metadata = std::fs::metadata(path).map_err(|cause| match cause.kind() {
+        std::io::ErrorKind::NotFound => Error::caller("there is no such file").at_path(path),
+        _ => Error::system(path, cause),
+    })?;
+    if metadata.is_dir() {
+        return Err(Error::caller("is a folder").at_path(path).remedy("name a scene or model file in it"));
+    }
+    let suffix = path.extension().and_then(|suffix| suffix.to_str()).unwrap_or_default().to_ascii_lowercase();
+    match suffix.as_str() {
+        "toml" => return Ok(Format::Scene),
+        "obj" => return Ok(Format::Obj),
+        "gltf" | "glb" => return Ok(Format::Gltf),
+        _ => {}
+    }
+    let mut start = Vec::new();
+    std::fs::File::open(path)
+        .and_then(|file| file.take(4096).read_to_end(&mut start))
+        .map_err(|cause| Error::system(path, cause))?;
+    sniff(&start).ok_or_else(|| {
+        let what =
+            if suffix.is_empty() { "the format is not known".into() } else { format!(".{suffix} is not supported") };
+        Error::unsupported(what).at_path(path).remedy(ACCEPTED)
+    })
+}
+
+/// The format by the first bytes of a file.
+fn sniff(start: &[u8]) -> Option<Format> {
+    if start.starts_with(b"glTF") {
+        return Some(Format::Gltf);
+    }
+    let text = String::from_utf8_lossy(start);
+    if text.trim_start_matches('\u{feff}').trim_start().starts_with('{') {
+        return text.contains("\"asset\"").then_some(Format::Gltf);
+    }
+    let is_obj = |line: &str| {
+        let mut words = line.split_ascii_whitespace();
+        matches!(words.next(), Some("v" | "f" | "vn" | "vt")) && words.next().is_some_and(|w| !w.starts_with('='))
+    };
+    let is_scene = |line: &str| {
+        let section = line.trim_start_matches('[');
+        line.starts_with('[')
+            && ["camera]", "film]", "object]", "material]", "light]"].iter().any(|s| section.starts_with(s))
+    };
+    text.lines().map(str::trim).find_map(|line| match line {
+        line if is_obj(line) => Some(Format::Obj),
+        line if is_scene(line) => Some(Format::Scene),
+        _ => None,
+    })
+}
+
+/// Rounds the angles of cameras and spots to the nearest that degrees can express, at most 2 ulp away, so that a scene
+/// file written for this scene holds them exactly.
+fn hold_angles_in_degrees(scene: &mut Scene) {
+    let round = |radians: &mut f64| *radians = radians.to_degrees().to_radians();
+    for named in &mut scene.cameras {
+        if let Camera::LookAt { projection: Projection::Perspective { fov_y }, .. } = &mut named.camera {
+            round(fov_y);
+        }
+    }
+    for light in &mut scene.lights {
+        if let LightKind::Spot { inner_angle, outer_angle, .. } = &mut light.kind {
+            round(inner_angle);
+            round(outer_angle);
+        }
+    }
 }

@@ -11,3 +11,7 @@ pub mod conventions {}
 /// How materials of model files become terms of the shading formula.
 #[doc = include_str!("materials.md")]
 pub mod materials {}
+
+/// The scene file, section by section.
+#[doc = include_str!("scene_format.md")]
+pub mod scene_format {}

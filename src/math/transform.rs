@@ -101,6 +101,20 @@ fn apply(m: &DMat3, v: DVec3) -> DVec3 {
     m.x_axis * v.x + m.y_axis * v.y + m.z_axis * v.z
 }
 
+/// The map that applies `inner`, then `outer`.
+pub fn compose(outer: &DAffine3, inner: &DAffine3) -> DAffine3 {
+    let (m, n) = (&outer.matrix3, &inner.matrix3);
+    let matrix3 = DMat3::from_cols(apply(m, n.x_axis), apply(m, n.y_axis), apply(m, n.z_axis));
+    DAffine3 { matrix3, translation: apply(m, inner.translation) + outer.translation }
+}
+
+/// A rotation by `angle` radians about the unit vector `axis` through the origin, right-handed (Rodrigues).
+pub fn rotation_about(axis: DVec3, angle: f64) -> DMat3 {
+    let (sin, cos) = libm::sincos(angle);
+    let turn = |v: DVec3| v * cos + cross(axis, v) * sin + axis * (dot(axis, v) * (1.0 - cos));
+    DMat3::from_cols(turn(DVec3::X), turn(DVec3::Y), turn(DVec3::Z))
+}
+
 /// A rotation about the x, then the y, then the z axis (fixed axes); radians.
 ///
 /// Uses `libm`, so that a rotated scene is the same on every machine.
@@ -144,5 +158,18 @@ mod tests {
         assert!(near(rotation_xyz(DVec3::new(quarter, 0.0, 0.0)) * DVec3::Y, DVec3::Z));
         assert!(near(rotation_xyz(DVec3::new(0.0, quarter, 0.0)) * DVec3::Z, DVec3::X));
         assert!(near(rotation_xyz(DVec3::new(0.0, 0.0, quarter)) * DVec3::X, DVec3::Y));
+        assert!(near(rotation_about(DVec3::Y, quarter) * DVec3::Z, DVec3::X));
+        let diagonal = DVec3::ONE / 3f64.sqrt();
+        assert!(near(rotation_about(diagonal, 4.0 * quarter / 3.0) * DVec3::X, DVec3::Y));
+    }
+
+    #[test]
+    fn the_inner_map_of_a_composition_comes_first() {
+        let (turn, shift) = (rotation_xyz(DVec3::new(0.1, -0.7, 2.0)), DVec3::new(1.0, 2.0, -3.0));
+        let outer = DAffine3 { matrix3: turn, translation: shift };
+        let inner = DAffine3::from_scale_rotation_translation(DVec3::new(2.0, 1.0, -0.5), glam::DQuat::IDENTITY, shift);
+        let p = DVec3::new(0.3, 0.7, 9.0);
+        let expected = outer.transform_point3(inner.transform_point3(p));
+        assert!((compose(&outer, &inner).transform_point3(p) - expected).abs().max_element() < 1e-14);
     }
 }

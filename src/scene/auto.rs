@@ -55,13 +55,18 @@ const MARGIN: f64 = 0.06;
 /// Gives a scene that came from a bare model what it lacks: a camera that frames it, lights, a background.
 pub fn complete(scene: &mut Scene) {
     scene.background = Background::Gradient { bottom: Rgb::splat(0.32), top: Rgb::new(0.80, 0.84, 0.90), up: DVec3::Y };
+    complete_camera(scene);
+    if scene.lights.is_empty() {
+        scene.lights = studio_lights(scene.camera());
+    }
+}
+
+/// Gives a scene without a camera one that frames it.
+pub fn complete_camera(scene: &mut Scene) {
     if scene.cameras.is_empty() {
         let (azimuth, elevation) = DEFAULT_ANGLES;
         let camera = frame(scene, azimuth.to_radians(), elevation.to_radians(), DEFAULT_FOV.to_radians());
         scene.cameras.push(NamedCamera { name: "auto".into(), camera });
-    }
-    if scene.lights.is_empty() {
-        scene.lights = studio_lights(scene.camera());
     }
 }
 

@@ -1,0 +1,19 @@
+//! The scene file: TOML that says what there is to see, from where, and how it becomes a picture.
+//!
+//! The format is described in the manual's page on it. Every mistake is an error with line and column; nothing is
+//! skipped in silence.
+
+mod light;
+mod material;
+mod object;
+mod read;
+mod shape;
+#[cfg(test)]
+mod tests;
+mod transform;
+mod value;
+mod view;
+mod write;
+
+pub use read::read;
+pub use write::save_model_scene;

@@ -1,0 +1,91 @@
+//! `[[object]]`: a shape, its material, and where it stands, once or several times.
+
+use glam::DAffine3;
+
+use crate::error::Result;
+use crate::formats::model::Contents;
+use crate::formats::scene_file::read::Reader;
+use crate::formats::scene_file::shape::{SHAPES, read_quadric};
+use crate::formats::scene_file::transform::read_transform;
+use crate::formats::scene_file::value::{Fields, Value};
+use crate::formats::{LoadOptions, NormalMode, UpAxis};
+use crate::math::transform::compose;
+use crate::scene::{Object, Shape};
+
+/// Reads an object and adds it to the reader's scene; `number` counts from 1 and names objects without a name.
+pub fn read_object(fields: &Fields<'_>, number: usize, reader: &mut Reader<'_>) -> Result<()> {
+    let given: Vec<_> = SHAPES.iter().filter_map(|key| fields.get(key).map(|value| (*key, value))).collect();
+    let (key, shape) = match given.as_slice() {
+        [one] => *one,
+        [] => {
+            // An unknown key may be a misspelt shape: it is reported first.
+            fields.accept(&[&SHAPES[..], &MESH_FIELDS[..]].concat())?;
+            let shapes = SHAPES.map(|key| format!("`{key}`")).join(", ");
+            return Err(fields.error("an object needs a shape").remedy(format!("one of {shapes}")));
+        }
+        [_, (second, value), ..] => {
+            let message = format!("the object has a second shape, `{second}`");
+            return Err(value.error(message).remedy("write it as an [[object]] of its own"));
+        }
+    };
+    let name = fields.get("name").map(|value| reader.claim_name("object", &value)).transpose()?;
+    let material = fields.get("material").map(|value| reader.material(&value)).transpose()?;
+    let places = read_places(fields)?;
+    let contents = if key == "mesh" {
+        fields.accept(&[&["mesh"], &MESH_FIELDS[..]].concat())?;
+        let options = read_load_options(fields, reader.options())?;
+        let mut contents = reader.model(&shape, &options)?;
+        for object in &mut contents.objects {
+            object.name = joined_name(name, &object.name);
+            object.material = material.or(object.material);
+        }
+        contents
+    } else {
+        fields.accept(&[&[key], &QUADRIC_FIELDS[..]].concat())?;
+        let (quadric, transform) = read_quadric(key, &shape)?;
+        let name = name.map_or_else(|| format!("{key} {number}"), str::to_owned);
+        let shape = Shape::Quadric(reader.add_quadric(quadric));
+        // Quadrics have no material of their own; the first of a scene is the neutral one.
+        let object = Object { name, shape, transform, material: material.or(Some(0)) };
+        Contents { objects: vec![object], ..Default::default() }
+    };
+    for (index, place) in places.iter().enumerate() {
+        reader.place(contents.clone(), place, (places.len() > 1).then_some(index + 1));
+    }
+    Ok(())
+}
+
+/// What objects have beside a shape that is a quadric.
+const QUADRIC_FIELDS: [&str; 4] = ["name", "material", "transform", "instances"];
+
+/// What objects have beside `mesh`.
+const MESH_FIELDS: [&str; 6] = ["name", "material", "transform", "instances", "normals", "up"];
+
+/// The transform of every instance: first `transform`, then that of the instance.
+fn read_places(fields: &Fields<'_>) -> Result<Vec<DAffine3>> {
+    let own = fields.or("transform", DAffine3::IDENTITY, read_transform)?;
+    let Some(instances) = fields.get("instances") else { return Ok(vec![own]) };
+    let list = instances.list()?;
+    if list.is_empty() {
+        return Err(instances.error("`instances` is empty").remedy("leave it out for a single object"));
+    }
+    list.iter().map(|instance| Ok(compose(&read_transform(instance)?, &own))).collect()
+}
+
+fn read_load_options(fields: &Fields<'_>, default: &LoadOptions) -> Result<LoadOptions> {
+    let modes = [("file", NormalMode::File), ("flat", NormalMode::Flat), ("smooth", NormalMode::Smooth)];
+    let axes = [("y", UpAxis::Y), ("z", UpAxis::Z)];
+    Ok(LoadOptions {
+        normals: fields.or("normals", default.normals, |value: &Value<'_>| value.choice(&modes))?,
+        up: fields.or("up", default.up, |value| value.choice(&axes))?,
+    })
+}
+
+/// An imported object's name under the name that the scene gives.
+fn joined_name(given: Option<&str>, imported: &str) -> String {
+    match (given, imported) {
+        (None, imported) => imported.to_owned(),
+        (Some(given), "") => given.to_owned(),
+        (Some(given), imported) => format!("{given}/{imported}"),
+    }
+}
