@@ -2,5 +2,7 @@
 
 mod accelerators;
 mod architecture;
+#[cfg(feature = "cli")]
+mod command_line;
 mod common;
 mod shading;

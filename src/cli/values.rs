@@ -10,10 +10,11 @@ use crate::render::Crop;
 /// The longest side of a picture, in pixels.
 const LONGEST_SIDE: u32 = 65_536;
 
-/// Accepts one of the names of a table and gives what stands beside it.
+/// Accepts one of these names and gives what stands beside it.
 pub fn one_of<T: Copy + Send + Sync + 'static>(
-    table: &'static [(&'static str, T)],
+    names: impl IntoIterator<Item = (&'static str, T)>,
 ) -> impl TypedValueParser<Value = T> {
+    let table: Vec<(&str, T)> = names.into_iter().collect();
     PossibleValuesParser::new(table.iter().map(|(name, _)| *name)).map(move |name| {
         let (_, value) = table.iter().find(|(known, _)| *known == name).expect("clap accepts the table's names alone");
         *value

@@ -1,0 +1,483 @@
+//! The program, run as a process.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::io::{BufRead, BufReader};
+use std::path::PathBuf;
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+/// The manual's page on the command line.
+const MANUAL: &str = include_str!("../src/manual/command_line.md");
+
+/// A folder to run the program in.
+struct Workshop {
+    folder: TempDir,
+}
+
+impl Workshop {
+    /// A folder with `model.obj`: a floor with a box and a slanted face on it, in two materials.
+    fn new() -> Self {
+        let workshop = Self { folder: tempfile::tempdir().unwrap() };
+        workshop.write(
+            "model.obj",
+            "mtllib model.mtl\n\
+             v -2 0 -2\nv 2 0 -2\nv 2 0 2\nv -2 0 2\n\
+             v -1 0 0\nv 0 0 0\nv 0 1 0\nv -1 1 0\nv -1 0 -1\nv 0 0 -1\nv 0 1 -1\nv -1 1 -1\n\
+             v 0.3 0 1\nv 1.5 0 0.6\nv 0.9 1.3 0.2\n\
+             usemtl floor\nf 4 3 2 1\n\
+             usemtl box\nf 5 6 7 8\nf 6 10 11 7\nf 10 9 12 11\nf 9 5 8 12\nf 8 7 11 12\n\
+             usemtl floor\nf 13 14 15\n",
+        );
+        workshop
+            .write("model.mtl", "newmtl floor\nKd 0.7 0.7 0.6\nnewmtl box\nKd 0.6 0.1 0.1\nKs 0.5 0.5 0.5\nillum 3\n");
+        workshop
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn write(&self, name: &str, text: &str) {
+        fs::write(self.path(name), text).unwrap();
+    }
+
+    fn names(&self) -> BTreeSet<String> {
+        fs::read_dir(self.folder.path())
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect()
+    }
+
+    /// The program with arguments separated by blanks, in this folder.
+    fn command(&self, arguments: &str) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_whitted"));
+        command.args(arguments.split_whitespace()).current_dir(self.folder.path()).stdin(Stdio::null());
+        command
+    }
+
+    fn run(&self, arguments: &str) -> Output {
+        self.command(arguments).output().unwrap()
+    }
+
+    /// Runs the program, which must succeed, and gives its standard output.
+    fn succeed(&self, arguments: &str) -> Vec<u8> {
+        let output = self.run(arguments);
+        assert!(output.status.success(), "{arguments}: {}", text(&output.stderr));
+        output.stdout
+    }
+
+    /// Runs the program, which must end with 1, silent on standard output, and gives its one line of standard error.
+    fn fail(&self, arguments: &str) -> String {
+        let output = self.run(arguments);
+        let stderr = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{arguments}: {stderr}");
+        assert!(output.stdout.is_empty(), "{arguments}");
+        assert_eq!(stderr.lines().count(), 1, "{arguments}: {stderr}");
+        assert!(stderr.starts_with("error: "), "{arguments}: {stderr}");
+        stderr
+    }
+
+    /// The PNG that a rendering of the model with these flags streams.
+    fn png(&self, flags: &str) -> Vec<u8> {
+        self.succeed(&format!("render model.obj -o - {flags}"))
+    }
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).unwrap()
+}
+
+/// Every key of an object, nested ones with dots; lists are not looked into.
+fn keys(value: &Value) -> BTreeSet<String> {
+    let mut all = BTreeSet::new();
+    for (key, value) in value.as_object().into_iter().flatten() {
+        all.insert(key.clone());
+        all.extend(keys(value).into_iter().map(|inner| format!("{key}.{inner}")));
+    }
+    all
+}
+
+/// The document has these keys, no others, and the manual names each.
+fn assert_documented(document: &Value, expected: &[&str]) {
+    let expected: BTreeSet<String> = expected.iter().map(|key| key.to_string()).collect();
+    assert_eq!(keys(document), expected);
+    for key in &expected {
+        let name = key.rsplit('.').next().unwrap();
+        assert!(MANUAL.contains(&format!("`{name}`")) || MANUAL.contains(&format!("\"{name}\"")), "`{key}` is missing");
+    }
+}
+
+#[test]
+fn the_picture_is_named_after_the_input_and_its_name_is_printed() {
+    let workshop = Workshop::new();
+    let printed = workshop.succeed("render model.obj --size 8x6 --spp 1");
+    assert_eq!(text(&printed), "model.png\n");
+    let picture = image::open(workshop.path("model.png")).unwrap();
+    assert_eq!((picture.width(), picture.height()), (8, 6));
+    assert_eq!(workshop.names().len(), 3, "no temporary file stays: {:?}", workshop.names());
+}
+
+#[test]
+fn a_streamed_picture_is_alone_on_standard_output() {
+    let workshop = Workshop::new();
+    let streamed = workshop.png("--size 8x6 --spp 1");
+    workshop.succeed("render model.obj --size 8x6 --spp 1");
+    assert_eq!(streamed, fs::read(workshop.path("model.png")).unwrap());
+}
+
+#[test]
+fn every_format_is_written_by_its_suffix() {
+    let workshop = Workshop::new();
+    for (name, magic) in [("a.png", &b"\x89PNG"[..]), ("a.JPG", b"\xff\xd8\xff"), ("a.exr", b"\x76\x2f\x31\x01")] {
+        workshop.succeed(&format!("render model.obj --size 4x4 --spp 1 -o {name}"));
+        assert!(fs::read(workshop.path(name)).unwrap().starts_with(magic), "{name}");
+    }
+    assert!(workshop.fail("render model.obj -o a.gif").contains(".png"));
+}
+
+#[test]
+fn extra_values_go_into_an_exr_or_beside_another_picture() {
+    let workshop = Workshop::new();
+    workshop.succeed("render model.obj --size 4x4 --spp 1 --aov depth,normal -o layers.exr");
+    workshop.succeed("render model.obj --size 4x4 --spp 1 --aov depth,normal -o beside.png");
+    assert!(workshop.path("beside.aov.exr").exists());
+    assert!(!workshop.path("layers.aov.exr").exists());
+    let bytes = fs::read(workshop.path("layers.exr")).unwrap();
+    assert!(bytes.windows(5).any(|part| part == b"depth"));
+    assert!(workshop.fail("render model.obj -o - --aov depth").contains("--aov"));
+}
+
+#[test]
+fn wrong_usage_ends_with_2() {
+    let workshop = Workshop::new();
+    for arguments in [
+        "",
+        "paint model.obj",
+        "render",
+        "render model.obj --size 5",
+        "render model.obj --spp 0",
+        "render model.obj --max-depth 1001",
+        "render model.obj --crop 5,5,5,9",
+        "render model.obj --view left --orbit 1,2",
+        "render model.obj --quiet --verbose",
+        "render model.obj --fov 180",
+        "render model.obj --colour",
+        "completions tcsh",
+    ] {
+        let output = workshop.run(arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments}");
+        assert!(output.stdout.is_empty() && !output.stderr.is_empty(), "{arguments}");
+    }
+    assert_eq!(workshop.run("--help").status.code(), Some(0));
+    assert!(text(&workshop.succeed("--version")).contains(env!("CARGO_PKG_VERSION")));
+}
+
+#[test]
+fn failures_are_one_line_that_names_the_file() {
+    let workshop = Workshop::new();
+    assert!(workshop.fail("render missing.obj").contains("missing.obj"));
+    assert!(workshop.fail("info missing.glb").contains("missing.glb"));
+    workshop.write("bad.toml", "[camera\n");
+    assert!(workshop.fail("info bad.toml").contains("bad.toml:1"));
+    assert!(workshop.fail("render model.obj --camera nobody").contains("nobody"));
+    let crop = workshop.fail("render model.obj --size 8x6 --crop 0,0,9,6");
+    assert!(crop.contains("8x6"), "{crop}");
+}
+
+#[test]
+fn an_output_that_cannot_be_written_is_found_out_before_rendering() {
+    let workshop = Workshop::new();
+    // At this size a rendering would take hours.
+    let started = Instant::now();
+    assert!(workshop.fail("render model.obj --size 60000x60000 -o nowhere/out.png").contains("nowhere"));
+    fs::create_dir(workshop.path("folder.png")).unwrap();
+    assert!(workshop.fail("render model.obj --size 60000x60000 -o folder.png").contains("folder.png"));
+    assert!(started.elapsed() < Duration::from_secs(10));
+}
+
+#[test]
+fn existing_files_are_replaced_unless_that_is_refused() {
+    let workshop = Workshop::new();
+    workshop.write("out.png", "old");
+    let refused = workshop.fail("render model.obj --size 4x4 --spp 1 -o out.png --no-clobber");
+    assert!(refused.contains("out.png") && refused.contains("--no-clobber"), "{refused}");
+    assert_eq!(fs::read(workshop.path("out.png")).unwrap(), b"old");
+    workshop.succeed("render model.obj --size 4x4 --spp 1 -o out.png");
+    assert!(fs::read(workshop.path("out.png")).unwrap().starts_with(b"\x89PNG"));
+    workshop.succeed("render model.obj --size 4x4 --spp 1 -o new.png --no-clobber");
+}
+
+#[test]
+fn inputs_are_never_overwritten() {
+    let workshop = Workshop::new();
+    let model = fs::read(workshop.path("model.obj")).unwrap();
+    for flags in ["--stats-json model.obj", "--save-scene ./model.obj", "-o model.obj"] {
+        workshop.fail(&format!("render model.obj --size 4x4 --spp 1 {flags}"));
+        assert_eq!(fs::read(workshop.path("model.obj")).unwrap(), model, "{flags}");
+    }
+}
+
+#[test]
+fn a_crop_has_the_pixels_of_the_full_picture() {
+    let workshop = Workshop::new();
+    let decode = |png: Vec<u8>| image::load_from_memory(&png).unwrap().to_rgb8();
+    let full = decode(workshop.png("--size 40x30 --spp 4"));
+    let crop = decode(workshop.png("--size 40x30 --spp 4 --crop 11,7,29,30"));
+    assert_eq!(crop.dimensions(), (18, 23));
+    for (x, y, pixel) in crop.enumerate_pixels() {
+        assert_eq!(pixel, full.get_pixel(x + 11, y + 7), "{x} {y}");
+    }
+    assert!(full.pixels().any(|pixel| pixel != full.get_pixel(0, 0)), "the picture shows something");
+}
+
+#[test]
+fn threads_and_accelerators_do_not_change_a_byte() {
+    let workshop = Workshop::new();
+    let reference = workshop.png("--size 40x30 --spp 2 --threads 1 --accelerator linear");
+    for flags in [
+        "--threads 2 --accelerator linear",
+        "--threads 1 --accelerator bvh2",
+        "--threads 2 --accelerator bvh2 --preset best",
+        "--threads 2 --accelerator cwbvh --preset fast",
+        "--accelerator auto",
+    ] {
+        assert!(workshop.png(&format!("--size 40x30 --spp 2 {flags}")) == reference, "{flags}");
+    }
+}
+
+#[test]
+fn views_differ_and_fill_the_picture() {
+    let workshop = Workshop::new();
+    let mut seen = BTreeSet::new();
+    for flags in ["", "--view front", "--view back", "--view top", "--orbit -40,10", "--view front --fov 80"] {
+        assert!(seen.insert(workshop.png(&format!("--size 24x18 --spp 1 {flags}"))), "{flags}");
+    }
+}
+
+#[test]
+fn quiet_is_silent_and_verbose_is_not() {
+    let workshop = Workshop::new();
+    workshop.write("lost.obj", "mtllib lost.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    let quiet = workshop.run("render lost.obj --size 4x4 --spp 1 --quiet");
+    assert!(quiet.status.success());
+    assert_eq!((text(&quiet.stdout), text(&quiet.stderr)), (String::new(), String::new()));
+    let normal = text(&workshop.run("render lost.obj --size 4x4 --spp 1").stderr);
+    assert!(normal.lines().all(|line| line.starts_with("warning: ")) && normal.contains("lost.mtl"), "{normal}");
+    let verbose = text(&workshop.run("render lost.obj --size 4x4 --spp 1 --verbose").stderr);
+    for stage in ["load", "build", "render", "write", "rays"] {
+        assert!(verbose.lines().any(|line| line.starts_with(stage)), "{stage}: {verbose}");
+    }
+}
+
+#[test]
+fn a_closed_standard_output_is_no_panic() {
+    let workshop = Workshop::new();
+    for (arguments, code) in [
+        ("info model.obj", 0),
+        ("completions bash", 0),
+        ("render model.obj --size 4x4 --spp 1", 0),
+        ("render model.obj --size 4x4 --spp 1 -o -", 1),
+    ] {
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let output = workshop.command(arguments).stdout(writer).stderr(Stdio::piped()).output().unwrap();
+        let stderr = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(code), "{arguments}: {stderr}");
+        assert!(!stderr.contains("panicked"), "{arguments}: {stderr}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_saves_what_is_finished_and_leaves_the_picture() {
+    let workshop = Workshop::new();
+    workshop.write("out.png", "old");
+    let arguments = "render model.obj --size 1500x1500 --spp 256 --accelerator linear -o out.png --verbose";
+    let mut child = workshop.command(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
+    lines.find(|line| line.starts_with("build")).expect("rendering begins");
+    std::thread::sleep(Duration::from_millis(300));
+    let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(sent.success());
+    let told = lines.last().unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130));
+    assert!(output.stdout.is_empty());
+    assert!(told.contains("out.partial.png"), "{told}");
+    assert_eq!(fs::read(workshop.path("out.png")).unwrap(), b"old");
+    let partial = image::open(workshop.path("out.partial.png")).unwrap();
+    assert_eq!((partial.width(), partial.height()), (1500, 1500));
+    assert_eq!(workshop.names().len(), 4, "{:?}", workshop.names());
+}
+
+#[test]
+fn every_shell_gets_completions() {
+    let workshop = Workshop::new();
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        let script = text(&workshop.succeed(&format!("completions {shell}")));
+        assert!(script.contains("save-scene") && script.contains("whitted"), "{shell}");
+    }
+}
+
+#[test]
+fn info_is_readable_and_its_json_is_stable() {
+    let workshop = Workshop::new();
+    let readable = text(&workshop.succeed("info model.obj --tree"));
+    for part in ["triangles", "13", "floor", "bvh", "KiB"] {
+        assert!(readable.contains(part), "{part}: {readable}");
+    }
+    let json: Value = serde_json::from_slice(&workshop.succeed("info model.obj --json")).unwrap();
+    assert_eq!(json["schema"], 1);
+    assert_eq!(json["triangles"]["unique"], 13);
+    assert_eq!(json["bounds"]["min"], serde_json::json!([-2.0, 0.0, -2.0]));
+    assert_eq!(json["bounds"]["max"], serde_json::json!([2.0, 1.3, 2.0]));
+    assert_eq!(json["tree"], Value::Null);
+    let mut expected = vec![
+        "schema",
+        "input",
+        "files",
+        "triangles",
+        "triangles.unique",
+        "triangles.instanced",
+        "triangles.dropped",
+        "triangles.dropped.non_finite",
+        "triangles.dropped.zero_area",
+        "triangles.dropped.bad_index",
+        "meshes",
+        "instances",
+        "quadrics",
+        "materials",
+        "textures",
+        "lights",
+        "cameras",
+        "active_camera",
+        "film",
+        "film.width",
+        "film.height",
+        "film.samples",
+        "film.max_depth",
+        "film.clamp",
+        "film.transfer",
+        "film.exposure",
+        "bounds",
+        "bounds.min",
+        "bounds.max",
+        "origin",
+        "needs",
+        "needs.mesh_objects",
+        "needs.quadric_objects",
+        "needs.unbounded_quadrics",
+        "needs.transformed_objects",
+        "needs.smooth_meshes",
+        "needs.uv_meshes",
+        "needs.textured_materials",
+        "needs.reflective_materials",
+        "needs.transmissive_materials",
+        "needs.lights",
+        "needs.background_image",
+        "bytes",
+        "bytes.positions",
+        "bytes.indices",
+        "bytes.normals",
+        "bytes.uvs",
+        "bytes.materials",
+        "bytes.textures",
+        "bytes_per_triangle",
+        "bytes_per_triangle.positions",
+        "bytes_per_triangle.indices",
+        "bytes_per_triangle.normals",
+        "bytes_per_triangle.uvs",
+        "bytes_per_triangle.materials",
+        "ledger",
+        "tree",
+    ];
+    assert_documented(&json, &expected);
+    let json: Value = serde_json::from_slice(&workshop.succeed("info model.obj --json --validate")).unwrap();
+    assert_eq!(json["tree"]["validated"], true);
+    expected.extend([
+        "tree.accelerator",
+        "tree.seconds",
+        "tree.node_bytes",
+        "tree.leaf_bytes",
+        "tree.top_level_bytes",
+        "tree.nodes",
+        "tree.leaves",
+        "tree.max_depth",
+        "tree.bytes_per_triangle",
+        "tree.validated",
+    ]);
+    assert_documented(&json, &expected);
+}
+
+#[test]
+fn the_statistics_of_a_rendering_are_stable() {
+    let workshop = Workshop::new();
+    workshop.succeed("render model.obj --size 9x7 --spp 3 --crop 1,1,9,7 --threads 2 --stats-json stats.json");
+    let json: Value = serde_json::from_slice(&fs::read(workshop.path("stats.json")).unwrap()).unwrap();
+    assert_eq!(json["schema"], 1);
+    assert_eq!(json["version"], env!("CARGO_PKG_VERSION"));
+    assert_eq!(json["rays"]["camera"], 8 * 6 * 3);
+    assert_eq!(json["settings"]["threads"], 2);
+    assert_eq!(json["bytes"]["film"], 8 * 6 * 12);
+    #[cfg(target_os = "linux")]
+    assert!(json["bytes"]["peak_resident"].as_u64().unwrap() > 1 << 20);
+    assert_documented(
+        &json,
+        &[
+            "schema",
+            "version",
+            "input",
+            "output",
+            "settings",
+            "settings.width",
+            "settings.height",
+            "settings.samples",
+            "settings.max_depth",
+            "settings.clamp",
+            "settings.transfer",
+            "settings.exposure",
+            "settings.camera",
+            "settings.crop",
+            "settings.crop.x0",
+            "settings.crop.y0",
+            "settings.crop.x1",
+            "settings.crop.y1",
+            "settings.aov",
+            "settings.accelerator",
+            "settings.preset",
+            "settings.threads",
+            "rays",
+            "rays.camera",
+            "rays.shadow",
+            "rays.reflected",
+            "rays.refracted",
+            "rays.total",
+            "seconds",
+            "seconds.load",
+            "seconds.build",
+            "seconds.render",
+            "seconds.write",
+            "bytes",
+            "bytes.geometry",
+            "bytes.textures",
+            "bytes.tree_nodes",
+            "bytes.tree_leaves",
+            "bytes.top_level",
+            "bytes.film",
+            "bytes.peak_resident",
+        ],
+    );
+}
+
+#[test]
+fn a_saved_scene_renders_the_same_picture() {
+    let workshop = Workshop::new();
+    let from_model = workshop.png("--size 24x18 --spp 2 --view iso --save-scene saved.toml");
+    let from_scene = workshop.succeed("render saved.toml -o -");
+    assert!(from_model == from_scene);
+    assert!(workshop.fail("render model.obj --save-scene saved.toml --no-clobber").contains("saved.toml"));
+}
