@@ -21,7 +21,7 @@ pub fn of(info: &Info<'_>) -> String {
     if !info.ledger.is_empty() {
         table.heading("read");
         for entry in &info.ledger {
-            table.line(&ledger::line(entry.treatment, &entry.feature, entry.count));
+            table.line(&format!("  {}", ledger::line(entry.treatment, &entry.feature, entry.count)));
         }
     }
     table.0
@@ -153,8 +153,14 @@ impl Table {
     }
 }
 
-fn point([x, y, z]: [f64; 3]) -> String {
-    format!("{x} {y} {z}")
+fn point(coordinates: [f64; 3]) -> String {
+    coordinates.map(|x| short(x).to_string()).join(" ")
+}
+
+/// The number to seven significant digits, which is what f32 tells apart.
+fn short(x: f64) -> f64 {
+    // Adding 0 takes the sign off a zero.
+    format!("{x:.6e}").parse().unwrap_or(x) + 0.0
 }
 
 /// A number of bytes with a unit of 1024s, to four digits.
@@ -180,6 +186,12 @@ mod tests {
         assert_eq!(readable(1536), "1.5 KiB");
         assert_eq!(readable(3 << 30), "3.0 GiB");
         assert_eq!(readable(u64::MAX), "16777216.0 TiB");
+    }
+
+    #[test]
+    fn coordinates_have_the_digits_that_f32_has() {
+        assert_eq!(point([f64::from(1.3f32), -0.0, 148_376.251]), "1.3 0 148376.3");
+        assert_eq!(point([f64::INFINITY, 1e-30, 1e12]), "inf 0.000000000000000000000000000001 1000000000000");
     }
 
     #[test]

@@ -46,7 +46,7 @@ pub fn run(arguments: &RenderArguments) -> Result<()> {
     }
     camera::choose(&mut scene, &arguments.camera)?;
     if let Some(path) = &outputs.scene {
-        return Err(Error::unsupported("scenes cannot be saved yet").at_path(path));
+        formats::scene_file::save_model_scene(&scene, &arguments.input, &options, path)?;
     }
 
     let renderer;
