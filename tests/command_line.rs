@@ -222,6 +222,37 @@ fn inputs_are_never_overwritten() {
 }
 
 #[test]
+fn files_that_an_input_refers_to_are_never_overwritten() {
+    let workshop = Workshop::new();
+    image::RgbImage::from_pixel(2, 2, image::Rgb([200, 90, 20])).save(workshop.path("wood.png")).unwrap();
+    let wood = fs::read(workshop.path("wood.png")).unwrap();
+    workshop.write("model.mtl", "newmtl floor\nmap_Kd wood.png\nnewmtl box\n");
+    workshop.write(
+        "model.gltf",
+        r#"{"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "material": 0}]}],
+            "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
+            "textures": [{"source": 0}], "images": [{"uri": "wood.png"}],
+            "buffers": [{"byteLength": 36, "uri":
+                "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}],
+            "bufferViews": [{"buffer": 0, "byteLength": 36}],
+            "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3",
+                "min": [0, 0, 0], "max": [1, 1, 0]}]}"#,
+    );
+    workshop.write(
+        "scene.toml",
+        "[[material]]\nname = \"wood\"\ntexture = \"wood.png\"\n[[object]]\nsphere = {}\nmaterial = \"wood\"\n",
+    );
+    workshop.write("outer.toml", "[[object]]\nmesh = \"model.gltf\"\n");
+    for input in ["model.obj", "model.gltf", "scene.toml", "outer.toml"] {
+        let refused = workshop.fail(&format!("render {input} --size 4x4 --spp 1 -o wood.png"));
+        assert!(refused.contains("wood.png"), "{refused}");
+        assert_eq!(fs::read(workshop.path("wood.png")).unwrap(), wood, "{input}");
+        workshop.succeed(&format!("render {input} --size 4x4 --spp 1 -o other.png --quiet"));
+    }
+}
+
+#[test]
 fn a_crop_has_the_pixels_of_the_full_picture() {
     let workshop = Workshop::new();
     let decode = |png: Vec<u8>| image::load_from_memory(&png).unwrap().to_rgb8();
@@ -476,8 +507,12 @@ fn the_statistics_of_a_rendering_are_stable() {
 #[test]
 fn a_saved_scene_renders_the_same_picture() {
     let workshop = Workshop::new();
-    let from_model = workshop.png("--size 24x18 --spp 2 --view iso --save-scene saved.toml");
-    let from_scene = workshop.succeed("render saved.toml -o -");
-    assert!(from_model == from_scene);
+    for flags in ["", "--view iso --fov 33.3", "--orbit -100,-7.7 --exposure 0.3 --max-depth 2 --normals smooth --up z"]
+    {
+        let from_model = workshop.png(&format!("--size 24x18 --spp 2 {flags} --save-scene saved.toml"));
+        let from_scene = workshop.succeed("render saved.toml -o -");
+        assert!(from_model == from_scene, "{flags}");
+    }
+    assert!(workshop.fail("render saved.toml --save-scene again.toml").contains("scene file already"));
     assert!(workshop.fail("render model.obj --save-scene saved.toml --no-clobber").contains("saved.toml"));
 }

@@ -132,7 +132,7 @@ pub fn run(arguments: &InfoArguments) -> Result<()> {
     super::use_threads(arguments.build.threads)?;
     let loaded = formats::open(&arguments.input, &arguments.load.options(), &terminal);
     terminal.clear();
-    let Loaded { scene, ledger } = loaded?;
+    let Loaded { scene, ledger, .. } = loaded?;
     ledger::report(&ledger, false);
     let mut info = Info::of(&arguments.input, &scene, &ledger);
     if arguments.tree || arguments.validate {

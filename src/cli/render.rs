@@ -20,6 +20,11 @@ use crate::scene::FilmSettings;
 /// Whatever stops it; [`Error::cancelled`] after Ctrl-C, when the picture's file is left as it was.
 pub fn run(arguments: &RenderArguments) -> Result<()> {
     let outputs = Outputs::plan(arguments)?;
+    if outputs.scene.is_some() && formats::is_scene(&arguments.input)? {
+        return Err(Error::caller("this is a scene file already; only what was chosen for a model can be saved")
+            .at_path(&arguments.input)
+            .remedy("leave out --save-scene"));
+    }
     let terminal = Terminal::new(arguments.quiet)?;
     super::use_threads(arguments.build.threads)?;
     let mut seconds = Seconds::default();
@@ -33,7 +38,7 @@ pub fn run(arguments: &RenderArguments) -> Result<()> {
     let loaded;
     (loaded, seconds.load) = timed(|| formats::open(&arguments.input, &options, &terminal));
     terminal.clear();
-    let formats::Loaded { mut scene, ledger } = loaded?;
+    let formats::Loaded { mut scene, ledger, automatic } = loaded?;
     if !arguments.quiet {
         ledger::report(&ledger, arguments.verbose);
     }
@@ -44,7 +49,8 @@ pub fn run(arguments: &RenderArguments) -> Result<()> {
     if let Some(crop) = arguments.film.crop {
         check_crop(crop, &scene.film)?;
     }
-    camera::choose(&mut scene, &arguments.camera)?;
+    let resized = arguments.film.size.is_some();
+    camera::choose(&mut scene, automatic, &arguments.camera, resized)?;
     if let Some(path) = &outputs.scene {
         formats::scene_file::save_model_scene(&scene, &arguments.input, &options, path)?;
     }

@@ -65,7 +65,8 @@ pub fn orbit(text: &str) -> Result<Orbit, String> {
 /// Reads a vertical field of view in degrees and gives radians.
 pub fn field_of_view(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
-        Ok(degrees) if degrees > 0.0 && degrees < 180.0 => Ok(degrees.to_radians()),
+        // The second conversion makes it a value that a scene file, which has degrees, gives back exactly.
+        Ok(degrees) if degrees > 0.0 && degrees < 180.0 => Ok(degrees.to_radians().to_degrees().to_radians()),
         _ => Err("expected degrees between 0 and 180, both excluded".into()),
     }
 }

@@ -14,7 +14,8 @@ use std::path::Path;
 
 use crate::error::{Error, Result};
 use crate::progress::Progress;
-use crate::scene::{Camera, LightKind, Projection, Scene, auto};
+use crate::scene::auto::{self, Automatic};
+use crate::scene::{Camera, LightKind, Projection, Scene};
 
 pub use ledger::{Ledger, Treatment};
 pub use model::Model;
@@ -59,6 +60,8 @@ pub struct Loaded {
     pub scene: Scene,
     /// What was honoured, approximated and ignored.
     pub ledger: Ledger,
+    /// What the scene lacked and was given.
+    pub automatic: Automatic,
 }
 
 /// Formats that [`open`] reads, for messages.
@@ -87,8 +90,16 @@ pub fn open(path: &Path, options: &LoadOptions, progress: &dyn Progress) -> Resu
     let ledger = model.ledger.clone();
     model.append_to(&mut scene);
     hold_angles_in_degrees(&mut scene);
-    auto::complete(&mut scene);
-    Ok(Loaded { scene, ledger })
+    let automatic = auto::complete(&mut scene);
+    Ok(Loaded { scene, ledger, automatic })
+}
+
+/// Whether [`open`] takes the file for a scene file rather than a model.
+///
+/// # Errors
+/// A file that cannot be read, or that is neither.
+pub fn is_scene(path: &Path) -> Result<bool> {
+    Ok(format_of(path)? == Format::Scene)
 }
 
 /// Loads a model file on its own.

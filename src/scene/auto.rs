@@ -52,22 +52,47 @@ pub const DEFAULT_FOV: f64 = 35.0;
 /// Empty border around the model, as a share of the picture on each side.
 const MARGIN: f64 = 0.06;
 
-/// Gives a scene that came from a bare model what it lacks: a camera that frames it, lights, a background.
-pub fn complete(scene: &mut Scene) {
-    scene.background = Background::Gradient { bottom: Rgb::splat(0.32), top: Rgb::new(0.80, 0.84, 0.90), up: DVec3::Y };
-    complete_camera(scene);
-    if scene.lights.is_empty() {
-        scene.lights = studio_lights(scene.camera());
-    }
+/// The name of the automatic camera.
+pub const CAMERA_NAME: &str = "auto";
+
+/// What of a scene was chosen automatically, and so is chosen again for another view of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Automatic {
+    /// The only camera.
+    pub camera: bool,
+    /// The lights.
+    pub lights: bool,
 }
 
-/// Gives a scene without a camera one that frames it.
-pub fn complete_camera(scene: &mut Scene) {
-    if scene.cameras.is_empty() {
-        let (azimuth, elevation) = DEFAULT_ANGLES;
-        let camera = frame(scene, azimuth.to_radians(), elevation.to_radians(), DEFAULT_FOV.to_radians());
-        scene.cameras.push(NamedCamera { name: "auto".into(), camera });
+/// Gives a scene that came from a bare model what it lacks: a camera that frames it, lights, a background.
+pub fn complete(scene: &mut Scene) -> Automatic {
+    scene.background = Background::Gradient { bottom: Rgb::splat(0.32), top: Rgb::new(0.80, 0.84, 0.90), up: DVec3::Y };
+    let automatic = Automatic { camera: complete_camera(scene), lights: scene.lights.is_empty() };
+    if automatic.lights {
+        light_from_camera(scene);
     }
+    automatic
+}
+
+/// Gives a scene without a camera one that frames it; whether it did.
+pub fn complete_camera(scene: &mut Scene) -> bool {
+    let missing = scene.cameras.is_empty();
+    if missing {
+        let camera = default_camera(scene, DEFAULT_FOV.to_radians());
+        scene.cameras.push(NamedCamera { name: CAMERA_NAME.into(), camera });
+    }
+    missing
+}
+
+/// A camera that frames the scene from a little to the right and above, for the film's current size; `fov_y` in radians.
+pub fn default_camera(scene: &Scene, fov_y: f64) -> Camera {
+    let (azimuth, elevation) = DEFAULT_ANGLES;
+    frame(scene, azimuth.to_radians(), elevation.to_radians(), fov_y)
+}
+
+/// Replaces the lights by a key, a fill and a rim light for the active camera.
+pub fn light_from_camera(scene: &mut Scene) {
+    scene.lights = studio_lights(scene.camera());
 }
 
 /// A camera that sees the whole scene from a direction and fills the picture with it.

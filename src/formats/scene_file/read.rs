@@ -14,7 +14,8 @@ use crate::formats::scene_file::{light, material, object, view};
 use crate::formats::{Ledger, LoadOptions, Loaded, load_model};
 use crate::geometry::Quadric;
 use crate::progress::Progress;
-use crate::scene::{NamedCamera, Scene, Texture, auto};
+use crate::scene::auto::{self, Automatic};
+use crate::scene::{NamedCamera, Scene, Texture};
 
 /// Larger files are no scene files: meshes are files of their own.
 const MOST_BYTES: u64 = 64 << 20;
@@ -59,8 +60,8 @@ pub(super) fn parse(text: &str, path: &Path, options: &LoadOptions, progress: &d
         imported: Contents::default(),
     };
     reader.ledger.note_file(path);
-    reader.read_scene(&Fields::root(&source, table.get_ref()))?;
-    Ok(Loaded { scene: reader.scene, ledger: reader.ledger })
+    let automatic = reader.read_scene(&Fields::root(&source, table.get_ref()))?;
+    Ok(Loaded { scene: reader.scene, ledger: reader.ledger, automatic })
 }
 
 /// A scene as far as it is read, and what has been read of other files.
@@ -79,7 +80,7 @@ pub struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn read_scene(&mut self, root: &Fields<'_>) -> Result<()> {
+    fn read_scene(&mut self, root: &Fields<'_>) -> Result<Automatic> {
         root.accept(&["camera", "film", "background", "ambient", "light", "material", "object", "override"])?;
         self.read_cameras(root)?;
         if let Some(background) = root.get("background") {
@@ -116,8 +117,7 @@ impl Reader<'_> {
             Some(film) => view::read_film(&film.table("the film")?, default)?,
             None => default,
         };
-        auto::complete_camera(&mut self.scene);
-        Ok(())
+        Ok(Automatic { camera: auto::complete_camera(&mut self.scene), lights: false })
     }
 
     fn read_cameras(&mut self, root: &Fields<'_>) -> Result<()> {

@@ -324,7 +324,7 @@ fn meshes_are_shared_replaced_and_overridden() {
          [[object]]\nmesh = \"m.obj\"\nnormals = \"smooth\"\nup = \"z\"\n\
          [[override]]\nmaterial = \"red\"\nkr = 0.5\n",
     );
-    let Loaded { scene, ledger } = opened(&folder, "s.toml").unwrap();
+    let Loaded { scene, ledger, .. } = opened(&folder, "s.toml").unwrap();
     let files: Vec<_> = ledger.files().filter_map(|path| path.file_name()?.to_str()).collect();
     assert!(["s.toml", "m.obj", "m.mtl", "t.png"].iter().all(|name| files.contains(name)), "{files:?}");
     let shapes: Vec<_> = scene.objects.iter().map(|object| object.shape).collect();
