@@ -15,7 +15,7 @@ use std::path::Path;
 use crate::error::{Error, Result};
 use crate::progress::Progress;
 use crate::scene::auto::{self, Automatic};
-use crate::scene::{Camera, LightKind, Projection, Scene};
+use crate::scene::{Camera, LightKind, Projection, Scene, exposure};
 
 pub use ledger::{Ledger, Treatment};
 pub use model::Model;
@@ -77,7 +77,8 @@ enum Format {
 
 /// Opens a scene file (`.toml`) or a model (`.obj`, `.gltf`, `.glb`), chosen by suffix and, failing that, by content.
 ///
-/// A model alone becomes a scene with an automatic camera, lights and background.
+/// A model alone becomes a scene with an automatic camera, lights and background; lights of its own in physical units
+/// set the film's exposure.
 ///
 /// # Errors
 /// Names the file, and line and column where there are such, and what would mend it.
@@ -88,8 +89,12 @@ pub fn open(path: &Path, options: &LoadOptions, progress: &dyn Progress) -> Resu
     let model = load_model(path, options, progress)?;
     let mut scene = Scene::default();
     let ledger = model.ledger.clone();
+    let physical_lights = model.physical_lights;
     model.append_to(&mut scene);
     hold_angles_in_degrees(&mut scene);
+    if physical_lights {
+        scene.film.exposure = exposure::automatic(&scene);
+    }
     let automatic = auto::complete(&mut scene);
     Ok(Loaded { scene, ledger, automatic })
 }

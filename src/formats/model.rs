@@ -5,8 +5,9 @@ use glam::{DAffine3, DVec3};
 use crate::formats::Ledger;
 use crate::geometry::TriangleMesh;
 use crate::geometry::mesh::Materials;
-use crate::math::transform::compose;
-use crate::scene::{Camera, Light, LightKind, Material, NamedCamera, Object, Scene, Shape, Texture};
+use crate::math::transform::{apply, compose};
+use crate::math::vector::length;
+use crate::scene::{Camera, Light, LightKind, Material, NamedCamera, Object, Projection, Scene, Shape, Texture};
 
 /// What a model file holds. Positions in its lists are local to it; [`Material`]s, [`Texture`]s and meshes are appended
 /// to a scene's lists by [`Model::append_to`].
@@ -39,15 +40,17 @@ pub struct Contents {
     pub cameras: Vec<NamedCamera>,
     /// Lights, in file order.
     pub lights: Vec<Light>,
+    /// Whether the lights are in physical units.
+    pub physical_lights: bool,
 }
 
 impl Model {
     /// Adds everything to a scene; the ledger is dropped.
     pub fn append_to(self, scene: &mut Scene) {
-        let mut contents = self.append_assets(scene);
-        scene.objects.append(&mut contents.objects);
-        scene.cameras.append(&mut contents.cameras);
-        scene.lights.append(&mut contents.lights);
+        let contents = self.append_assets(scene);
+        scene.objects.extend(contents.objects);
+        scene.cameras.extend(contents.cameras);
+        scene.lights.extend(contents.lights);
     }
 
     /// Adds meshes, materials and textures to a scene and returns what is to be placed in it.
@@ -76,7 +79,12 @@ impl Model {
             object.material = object.material.map(|material| material + first_material);
             object
         });
-        Contents { objects: objects.collect(), cameras: self.cameras, lights: self.lights }
+        Contents {
+            objects: objects.collect(),
+            cameras: self.cameras,
+            lights: self.lights,
+            physical_lights: self.physical_lights,
+        }
     }
 }
 
@@ -87,16 +95,16 @@ impl Contents {
         if *transform == DAffine3::IDENTITY {
             return self;
         }
-        let point = |p: DVec3| compose(transform, &DAffine3::from_translation(p)).translation;
-        let vector = |v: DVec3| point(v) - transform.translation;
+        let vector = |v: DVec3| apply(&transform.matrix3, v);
+        let point = |p: DVec3| vector(p) + transform.translation;
         for object in &mut self.objects {
             object.transform = compose(transform, &object.transform);
         }
         for named in &mut self.cameras {
             match &mut named.camera {
                 Camera::LookAt { eye, target, up, projection } => {
-                    if let crate::scene::Projection::Orthographic { height } = projection {
-                        *height *= vector(*up).length() / up.length();
+                    if let Projection::Orthographic { height } = projection {
+                        *height *= length(vector(*up)) / length(*up);
                     }
                     (*eye, *target, *up) = (point(*eye), point(*target), vector(*up));
                 }
@@ -117,5 +125,75 @@ impl Contents {
             }
         }
         self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::texture::{Filter, Texels, Wrap};
+    use crate::scene::{Falloff, Rgb, TextureRef};
+
+    #[test]
+    fn appended_numbers_are_shifted_together() {
+        let texture = |name: &str| Texture {
+            name: name.into(),
+            width: 1,
+            height: 1,
+            texels: Texels::Srgb8(vec![[0; 4]].into()),
+            wrap: [Wrap::Repeat; 2],
+            filter: Filter::Linear,
+        };
+        let material = Material { diffuse_texture: Some(TextureRef::new(0)), ..Default::default() };
+        let mesh = |materials| TriangleMesh { materials, ..Default::default() };
+        let object = |mesh| Object {
+            name: String::new(),
+            shape: Shape::Mesh(mesh),
+            transform: DAffine3::IDENTITY,
+            material: Some(1),
+        };
+        let model = Model {
+            meshes: vec![mesh(Materials::One(1)), mesh(Materials::PerTriangle(vec![0, 1]))],
+            materials: vec![Material::default(), material],
+            textures: vec![texture("a")],
+            objects: vec![object(1)],
+            ..Default::default()
+        };
+        let mut scene = Scene::default();
+        model.clone().append_to(&mut scene);
+        model.append_to(&mut scene);
+        assert_eq!(
+            scene.objects.iter().map(|o| (o.shape, o.material)).collect::<Vec<_>>(),
+            [(Shape::Mesh(1), Some(2)), (Shape::Mesh(3), Some(4)),]
+        );
+        assert_eq!(scene.meshes[2].materials, Materials::One(4));
+        assert_eq!(scene.meshes[3].materials, Materials::PerTriangle(vec![3, 4]));
+        assert_eq!(scene.materials[4].diffuse_texture, Some(TextureRef::new(1)));
+    }
+
+    #[test]
+    fn cameras_and_lights_move_with_their_model() {
+        let projection = Projection::Orthographic { height: 3.0 };
+        let camera = Camera::LookAt { eye: DVec3::Z, target: DVec3::ZERO, up: DVec3::Y, projection };
+        let kind = LightKind::Spot {
+            position: DVec3::X,
+            direction: DVec3::NEG_Y,
+            inner_angle: 0.1,
+            outer_angle: 0.2,
+            falloff: Falloff::None,
+        };
+        let contents = Contents {
+            cameras: vec![NamedCamera { name: "c".into(), camera }],
+            lights: vec![Light { name: "l".into(), kind, color: Rgb::ONE }],
+            ..Default::default()
+        };
+        let shift = DVec3::new(1e9, 0.0, 0.0);
+        let moved = contents
+            .transformed(&DAffine3 { matrix3: glam::DMat3::from_diagonal(DVec3::splat(2.0)), translation: shift });
+        let projection = Projection::Orthographic { height: 6.0 };
+        let camera = Camera::LookAt { eye: shift + DVec3::Z * 2.0, target: shift, up: DVec3::Y * 2.0, projection };
+        assert_eq!(moved.cameras[0].camera, camera);
+        let LightKind::Spot { position, direction, .. } = moved.lights[0].kind else { panic!() };
+        assert_eq!((position, direction), (shift + DVec3::X * 2.0, DVec3::Y * -2.0));
     }
 }

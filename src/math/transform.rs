@@ -97,7 +97,7 @@ impl Transform {
 
 /// `m v`, each component summed left to right.
 #[inline(always)]
-fn apply(m: &DMat3, v: DVec3) -> DVec3 {
+pub fn apply(m: &DMat3, v: DVec3) -> DVec3 {
     m.x_axis * v.x + m.y_axis * v.y + m.z_axis * v.z
 }
 

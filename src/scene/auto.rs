@@ -149,7 +149,7 @@ fn depth_of_center(points: &[DVec3], backward: DVec3, fallback: f64) -> f64 {
 
 /// Points in the file's coordinates whose hull is that of the scene, or nearly: mesh vertices, every n-th of very large
 /// scenes, and the corners of the boxes of bounded quadrics.
-fn outline(scene: &Scene) -> Vec<DVec3> {
+pub(super) fn outline(scene: &Scene) -> Vec<DVec3> {
     const MOST_POINTS: usize = 2_000_000;
     let vertices = |shape: Shape| match shape {
         Shape::Mesh(mesh) => scene.meshes[mesh as usize].live_count() * 3,

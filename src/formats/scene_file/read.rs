@@ -15,7 +15,7 @@ use crate::formats::{Ledger, LoadOptions, Loaded, load_model};
 use crate::geometry::Quadric;
 use crate::progress::Progress;
 use crate::scene::auto::{self, Automatic};
-use crate::scene::{NamedCamera, Scene, Texture};
+use crate::scene::{NamedCamera, Scene, Texture, exposure};
 
 /// Larger files are no scene files: meshes are files of their own.
 const MOST_BYTES: u64 = 64 << 20;
@@ -108,11 +108,15 @@ impl Reader<'_> {
         if self.scene.cameras.is_empty() {
             self.scene.cameras = std::mem::take(&mut self.imported.cameras);
         }
-        if self.scene.lights.is_empty() {
+        let imports_lights = self.scene.lights.is_empty() && !self.imported.lights.is_empty();
+        if imports_lights {
             self.scene.lights = std::mem::take(&mut self.imported.lights);
         }
         // The automatic camera frames the scene for the film's size.
-        let default = view::default_film(self.scene.cameras.first().map(|named| &named.camera));
+        let mut default = view::default_film(self.scene.cameras.first().map(|named| &named.camera));
+        if imports_lights && self.imported.physical_lights {
+            default.exposure = exposure::automatic(&self.scene);
+        }
         self.scene.film = match root.get("film") {
             Some(film) => view::read_film(&film.table("the film")?, default)?,
             None => default,
@@ -256,6 +260,7 @@ impl Reader<'_> {
         self.scene.objects.append(&mut placed.objects);
         self.imported.cameras.append(&mut placed.cameras);
         self.imported.lights.append(&mut placed.lights);
+        self.imported.physical_lights |= placed.physical_lights;
     }
 }
 
