@@ -27,6 +27,10 @@ use crate::scene::Transfer;
 /// At this quality the loss is hard to see, and files are a third of those at 100.
 const JPEG_QUALITY: u8 = 95;
 
+/// On a noisy 1280x720 picture this level took a quarter of the default's time for 3 % more bytes; the fastest one made
+/// files half as large again.
+const PNG_COMPRESSION: CompressionType = CompressionType::Level(3);
+
 /// A format that pictures are written in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum PictureFormat {
@@ -112,7 +116,7 @@ fn write(film: &Film, format: PictureFormat, mut out: &mut dyn Sink) -> Result<(
             film,
             format,
             exposure,
-            PngEncoder::new_with_quality(out, CompressionType::Default, FilterType::Adaptive),
+            PngEncoder::new_with_quality(out, PNG_COMPRESSION, FilterType::Adaptive),
         ),
         PictureFormat::Jpeg => encode_bytes(film, format, exposure, JpegEncoder::new_with_quality(out, JPEG_QUALITY)),
         PictureFormat::WebP => encode_bytes(film, format, exposure, WebPEncoder::new_lossless(out)),

@@ -171,6 +171,14 @@ fn mistakes_are_told_with_line_column_and_what_is_accepted() {
 }
 
 #[test]
+fn other_systems_line_ends_and_marks_do_no_harm() {
+    let text = "\u{feff}ambient = 0.5\r\n[film]\r\nwidth = 7\r\nheigth = 3\r\n";
+    let message = parsed(text).unwrap_err().to_string();
+    assert!(message.starts_with("s.toml:4:1: unknown key `heigth` of the film; did you mean `height`?"), "{message}");
+    assert_eq!(scene(&text.replace("heigth", "height")).film.height, 3);
+}
+
+#[test]
 fn cameras_choose_the_film() {
     let look_at = scene("[camera]\neye = [0, 0, 5]\ntarget = [0, 0, 0]\nfov = 90");
     let projection = Projection::Perspective { fov_y: std::f64::consts::FRAC_PI_2 };
