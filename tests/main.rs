@@ -6,3 +6,4 @@ mod architecture;
 mod command_line;
 mod common;
 mod shading;
+mod spawned_rays;

@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3, Vec3};
 
 use crate::geometry::Hit;
 use crate::math::float::{gamma, round_down, round_up};
-use crate::math::vector::{cross, dot, normalize};
+use crate::math::vector::{cross, dot, length, normalize};
 use crate::render::world::{Instance, World};
 use crate::scene::camera::ViewRay;
 use crate::scene::{Scene, Shape};
@@ -54,56 +54,53 @@ impl SurfacePoint {
                         given.then(|| na.as_dvec3() * wa + nb.as_dvec3() * wb + nc.as_dvec3() * wc)
                     })
                 };
-                // Pharr et al. 6.8.5: a point from barycentrics is off by gamma(7) of what was summed. The f64 sum
-                // is better than that, but a ray that starts here meets the triangle with an f32 test of that size.
-                let error = (a.abs() * wa + b.abs() * wb + c.abs() * wc) * gamma(7);
+                let error = test_error(position, weights, corners, face);
                 Self::placed(instance, ray, position, face, smooth, error, material)
             }
             Shape::Quadric(quadric) => {
                 let quadric = &scene.quadrics[quadric as usize];
                 let (origin, direction) = instance.local_line(ray.origin, ray.direction);
                 let point = quadric.point(origin, direction, hit.primitive);
-                // Besides the error of the f64 solution there is only the f32 rounding of the new ray's origin.
-                let error = DVec3::splat(point.error);
                 let material = object.material.unwrap_or(0);
-                Self::placed(instance, ray, point.position, point.normal, None, error, material)
+                Self::placed(instance, ray, point.position, point.normal, None, point.error, material)
             }
         }
     }
 
-    /// Brings a point with its normals and error bound from object space into the world.
+    /// Brings a point with its normals into the world; `error` bounds how far along the normal an intersection in
+    /// object space may be off.
     fn placed(
         instance: &Instance,
         ray: &ViewRay,
         position: DVec3,
         face: DVec3,
         smooth: Option<DVec3>,
-        error: DVec3,
+        error: f64,
         material: u32,
     ) -> Self {
         let against = -ray.direction;
-        let transform = &instance.transform;
-        let (world, error, face, smooth) = if instance.identity {
-            (position, error, face, smooth)
+        let local_normal = normalize(face).unwrap_or(DVec3::ZERO);
+        let (world, normal, smooth, magnitude, stretch) = if instance.identity {
+            (position, local_normal, smooth, position.abs() * gamma(1), 1.0)
         } else {
-            // Pharr et al. 6.8.6: transforming adds 3 gamma of the magnitudes; one more for rounding the local ray.
+            let transform = &instance.transform;
             let m = transform.to_world();
-            let magnitude = |v: DVec3| {
-                m.matrix3.x_axis.abs() * v.x.abs()
-                    + m.matrix3.y_axis.abs() * v.y.abs()
-                    + m.matrix3.z_axis.abs() * v.z.abs()
-            };
-            let moved = magnitude(error) + (magnitude(position) + m.translation.abs()) * gamma(4);
+            let normal = transform.normal_to_world(local_normal);
+            // Pharr et al. 6.8.6: transforming adds 3 gamma of the magnitudes; one more for rounding the local ray.
+            let magnitude = m.matrix3.x_axis.abs() * position.x.abs()
+                + m.matrix3.y_axis.abs() * position.y.abs()
+                + m.matrix3.z_axis.abs() * position.z.abs()
+                + m.translation.abs();
             let smooth = smooth.map(|n| transform.normal_to_world(n));
-            (transform.point_to_world(position), moved, transform.normal_to_world(face), smooth)
+            // Planes a distance 1 apart in object space are 1 / |M^-T n| apart in the world.
+            (transform.point_to_world(position), normal, smooth, magnitude * gamma(4), 1.0 / length(normal))
         };
-        let outward = normalize(face).unwrap_or(against);
+        let outward = normalize(normal).unwrap_or(against);
         let from_outside = dot(outward, against) >= 0.0;
         let geometric_normal = if from_outside { outward } else { -outward };
         let normal = smooth.and_then(normalize).unwrap_or(geometric_normal);
         let normal = if dot(normal, geometric_normal) < 0.0 { -normal } else { normal };
-        let error = error + world.abs() * gamma(1);
-        let offset = dot(geometric_normal.abs(), error);
+        let offset = error * stretch + dot(geometric_normal.abs(), magnitude);
         Self { position: world, geometric_normal, normal, from_outside, material, offset }
     }
 
@@ -130,6 +127,32 @@ impl SurfacePoint {
         };
         Vec3::new(away(moved.x, normal.x), away(moved.y, normal.y), away(moved.z, normal.z))
     }
+}
+
+/// How far along the normal the f32 triangle test may place a hit of a ray that starts at `position` on the triangle.
+///
+/// The edge functions are off by some roundings of the squared distance to the corners; divided by twice the area that
+/// is the error of the barycentrics, and times the distance that of the place: it grows as a triangle gets thinner,
+/// and along the normal does not depend on the ray's direction. But t is clamped to where the ray crosses the
+/// triangle's box, so that leaving the box is enough: on an axis-aligned triangle that is no distance at all, and
+/// contact shadows stay attached. Seven roundings of the corners themselves are for the point's own place (Pharr et
+/// al. 6.8.5).
+fn test_error(position: DVec3, weights: [f64; 3], [a, b, c]: [DVec3; 3], face: DVec3) -> f64 {
+    let Some(normal) = normalize(face) else { return 0.0 };
+    let twice_area = length(face);
+    let reach = [a, b, c].iter().fold(0.0f64, |reach, corner| reach.max((*corner - position).abs().max_element()));
+    let (min, max) = (a.min(b).min(c), a.max(b).max(c));
+    let leaving = |side: f64| {
+        let exit = |axis: usize| {
+            let along = side * normal[axis];
+            let plane = if along > 0.0 { max[axis] } else { min[axis] };
+            if along == 0.0 { f64::INFINITY } else { ((plane - position[axis]) / along).max(0.0) }
+        };
+        exit(0).min(exit(1)).min(exit(2))
+    };
+    let box_exit = leaving(1.0).max(leaving(-1.0));
+    let place = (a.abs() * weights[0] + b.abs() * weights[1] + c.abs() * weights[2]) * gamma(7);
+    (gamma(4) * reach * (1.0 + reach * reach / twice_area)).min(box_exit) + dot(normal.abs(), place)
 }
 
 /// The weights of a triangle's corners where the f64 ray meets it, kept inside the triangle.
