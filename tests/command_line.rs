@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::PathBuf;
-use std::process::{Command, Output, Stdio};
+use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
@@ -322,27 +322,53 @@ fn a_closed_standard_output_is_no_panic() {
     }
 }
 
+/// A rendering of the model that has begun and takes much longer than any test, and its further lines of diagnostics.
+#[cfg(unix)]
+fn begin_rendering(workshop: &Workshop, flags: &str) -> (Child, impl Iterator<Item = String>) {
+    let arguments = format!("render model.obj --accelerator linear --verbose {flags}");
+    let mut child = workshop.command(&arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
+    lines.find(|line| line.starts_with("build")).expect("rendering begins");
+    std::thread::sleep(Duration::from_millis(200));
+    (child, lines)
+}
+
+#[cfg(unix)]
+fn interrupt(child: &Child) {
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+}
+
 #[cfg(unix)]
 #[test]
 fn an_interrupt_saves_what_is_finished_and_leaves_the_picture() {
     let workshop = Workshop::new();
     workshop.write("out.png", "old");
-    let arguments = "render model.obj --size 1500x1500 --spp 256 --accelerator linear -o out.png --verbose";
-    let mut child = workshop.command(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
-    lines.find(|line| line.starts_with("build")).expect("rendering begins");
-    std::thread::sleep(Duration::from_millis(300));
-    let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
-    assert!(sent.success());
+    let (child, lines) = begin_rendering(&workshop, "--size 1500x1500 --spp 256 -o out.png");
+    interrupt(&child);
     let told = lines.last().unwrap();
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(130));
     assert!(output.stdout.is_empty());
     assert!(told.contains("out.partial.png"), "{told}");
     assert_eq!(fs::read(workshop.path("out.png")).unwrap(), b"old");
-    let partial = image::open(workshop.path("out.partial.png")).unwrap();
-    assert_eq!((partial.width(), partial.height()), (1500, 1500));
+    let partial = image::open(workshop.path("out.partial.png")).unwrap().to_rgb8();
+    assert_eq!(partial.dimensions(), (1500, 1500));
+    assert!(partial.pixels().any(|pixel| pixel.0 != [0; 3]), "some tiles are finished");
     assert_eq!(workshop.names().len(), 4, "{:?}", workshop.names());
+}
+
+#[cfg(unix)]
+#[test]
+fn a_second_interrupt_ends_at_once() {
+    let workshop = Workshop::new();
+    // The first interrupt takes effect between rows, and a row of this takes minutes.
+    let (mut child, _lines) = begin_rendering(&workshop, "--size 64x64 --spp 1048576 -o out.png");
+    interrupt(&child);
+    std::thread::sleep(Duration::from_millis(200));
+    assert_eq!(child.try_wait().unwrap(), None);
+    interrupt(&child);
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    assert_eq!(workshop.names().len(), 2, "{:?}", workshop.names());
 }
 
 #[test]

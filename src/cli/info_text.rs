@@ -1,5 +1,7 @@
 //! What `whitted info` tells a person: one aligned table, a paragraph a subject.
 
+use std::collections::BTreeMap;
+
 use super::info::{Info, PerTriangle, Tree};
 use super::ledger;
 use super::terminal::printable;
@@ -139,11 +141,19 @@ impl Table {
         self.line(&format!("  {label:LABEL$} {value}"));
     }
 
-    /// A number of things, and one name a line below it.
+    /// A number of things, and one name a line below it; a name that several have comes once.
     fn list(&mut self, label: &str, names: &[String]) {
         self.row(label, names.len());
+        let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
         for name in names {
-            self.line(&format!("  {:LABEL$}   {name}", ""));
+            *counts.entry(name).or_default() += 1;
+        }
+        for name in names {
+            match counts.remove(name.as_str()) {
+                Some(1) => self.line(&format!("  {:LABEL$}   {name}", "")),
+                Some(count) => self.line(&format!("  {:LABEL$}   {name} ({count} of them)", "")),
+                None => {}
+            }
         }
     }
 
@@ -201,5 +211,13 @@ mod tests {
         table.list("names", &["x".into()]);
         let columns: Vec<_> = table.0.lines().map(|line| line.find(['1', 'x']).unwrap()).collect();
         assert_eq!(columns, [3 + LABEL, 3 + LABEL, 5 + LABEL]);
+    }
+
+    #[test]
+    fn names_keep_their_order_and_come_once() {
+        let mut table = Table(String::new());
+        table.list("materials", &["wood", "glass", "wood"].map(String::from));
+        let words: Vec<_> = table.0.split_whitespace().collect();
+        assert_eq!(words, ["materials", "3", "wood", "(2", "of", "them)", "glass"]);
     }
 }
