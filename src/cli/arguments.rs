@@ -8,12 +8,11 @@ use clap_complete::Shell;
 use super::values::{self, Orbit, one_of};
 use crate::accel::{Kind, Params, Preset};
 use crate::formats::{LoadOptions, NormalMode, UpAxis};
+use crate::render::ray_tracing::LARGEST_DEPTH;
 use crate::render::{AovKind, Crop, RenderSettings};
 use crate::scene::auto::View;
 use crate::scene::{Clamp, FilmSettings, Transfer};
 
-/// Mirrors seen in mirrors are followed no deeper, whatever is asked for.
-const DEEPEST: u32 = 1000;
 /// Samples a pixel beyond which nothing visible changes any more.
 const MOST_SAMPLES: u32 = 1 << 20;
 /// Far more threads than any machine has processors.
@@ -97,7 +96,7 @@ pub struct FilmArguments {
     #[arg(long, value_name = "N", value_parser = values::count(1..=MOST_SAMPLES))]
     pub spp: Option<u32>,
     /// How often a ray may be reflected or refracted, up to 1000; 0 is direct light alone.
-    #[arg(long, value_name = "N", value_parser = values::count(0..=DEEPEST))]
+    #[arg(long, value_name = "N", value_parser = values::count(0..=LARGEST_DEPTH))]
     pub max_depth: Option<u32>,
     /// Render this part alone: pixels from the top left corner, X1 and Y1 excluded.
     #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = values::crop, allow_hyphen_values = true)]

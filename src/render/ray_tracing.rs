@@ -22,7 +22,7 @@ const TILE: u32 = 32;
 /// Stack of a rendering thread: room for the deepest recursion that is allowed (a frame is well below 2 KiB).
 const STACK: usize = 16 << 20;
 
-/// The largest `max_depth` that [`ray_tracing`] accepts: what fits [`STACK`] with room to spare.
+/// The largest `max_depth` that [`ray_tracing`] accepts: what fits `STACK` with room to spare.
 pub const LARGEST_DEPTH: u32 = 1000;
 
 /// One tile's pixels, rows from the top.
