@@ -99,7 +99,7 @@ pub fn files() -> Vec<OutputFile> {
                     "baseColorTexture": { "index": 1 }, "metallicFactor": 0.0, "roughnessFactor": 0.9 } },
             ],
             "cameras": [{ "name": "photographer", "type": "perspective",
-                "perspective": { "aspectRatio": 1.5, "yfov": 0.6, "znear": 0.1 } }],
+                "perspective": { "aspectRatio": 1.5, "yfov": 0.62, "znear": 0.1 } }],
             "scene": 0,
             "scenes": [{ "name": "yard", "nodes": [0, 8, 10, 11] }],
             "nodes": [
@@ -119,10 +119,10 @@ pub fn files() -> Vec<OutputFile> {
                 { "name": "fallen", "mesh": crate_number, "translation": [0.3, 0.3, 1.6],
                     "rotation": [-std::f64::consts::FRAC_1_SQRT_2, 0.0, 0.0, std::f64::consts::FRAC_1_SQRT_2],
                     "scale": [0.9, 0.9, 0.6] },
-                { "name": "tripod", "translation": [0.2, 2.6, 7.6], "children": [9] },
-                // Looks down by 13 degrees.
+                { "name": "tripod", "translation": [0.2, 2.6, 7.8], "children": [9] },
+                // Looks down by 8 degrees.
                 { "name": "photographer", "camera": 0,
-                    "rotation": [libm::sin(-6.5f64.to_radians()), 0.0, 0.0, libm::cos(6.5f64.to_radians())] },
+                    "rotation": [libm::sin(-4f64.to_radians()), 0.0, 0.0, libm::cos(4f64.to_radians())] },
                 { "name": "key", "translation": [3.0, 5.0, 4.0], "extensions": { "KHR_lights_punctual": { "light": 0 } } },
                 // Shines from the left, behind the camera: -Z turned down and to the right.
                 { "name": "fill", "rotation": fill_rotation(), "extensions": { "KHR_lights_punctual": { "light": 1 } } },
