@@ -5,7 +5,7 @@ use std::io::{self, IsTerminal, Write};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{HumanDuration, ProgressBar, ProgressState, ProgressStyle};
 
 use crate::error::{Error, Result};
 use crate::progress::Progress;
@@ -73,10 +73,10 @@ impl Terminal {
 
 impl Progress for Terminal {
     fn begin(&self, stage: &'static str, total: u64) {
-        let template =
-            if total == 0 { "{prefix:8} {elapsed}" } else { "{prefix:8} {wide_bar} {percent:>3} %, {eta} left" };
+        let template = if total == 0 { "{prefix:8} {elapsed}" } else { "{prefix:8} {wide_bar} {percent:>3} %{left}" };
+        let style = ProgressStyle::with_template(template).expect("the templates are valid");
         self.bar.reset();
-        self.bar.set_style(ProgressStyle::with_template(template).expect("the templates are valid"));
+        self.bar.set_style(style.with_key("left", write_time_left));
         self.bar.set_prefix(stage);
         if total == 0 {
             self.bar.unset_length();
@@ -92,6 +92,14 @@ impl Progress for Terminal {
 
     fn is_cancelled(&self) -> bool {
         INTERRUPTED.load(Ordering::Relaxed)
+    }
+}
+
+/// The time left, once there is a pace to tell it from.
+fn write_time_left(state: &ProgressState, out: &mut dyn std::fmt::Write) {
+    if state.pos() > 0 {
+        // A bar has nowhere to report an error to.
+        let _ = write!(out, ", {:#} left", HumanDuration(state.eta()));
     }
 }
 
