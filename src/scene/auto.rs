@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use crate::math::vector::{cross, dot, normalize};
+use crate::scene::room::Room;
 use crate::scene::{Background, Camera, Light, LightKind, NamedCamera, Projection, Rgb, Scene, Shape};
 
 /// A named direction to look from.
@@ -84,15 +85,23 @@ pub fn complete_camera(scene: &mut Scene) -> bool {
     missing
 }
 
-/// A camera that frames the scene from a little to the right and above, for the film's current size; `fov_y` in radians.
+/// A camera that frames the scene from a little to the right and above, or looks straight into a room that is open on
+/// one side, for the film's current size; `fov_y` in radians.
 pub fn default_camera(scene: &Scene, fov_y: f64) -> Camera {
-    let (azimuth, elevation) = DEFAULT_ANGLES;
-    frame(scene, azimuth.to_radians(), elevation.to_radians(), fov_y)
+    let (azimuth, elevation) = match Room::of(scene) {
+        Some(room) => (room.azimuth, 0.0),
+        None => (DEFAULT_ANGLES.0.to_radians(), DEFAULT_ANGLES.1.to_radians()),
+    };
+    frame(scene, azimuth, elevation, fov_y)
 }
 
-/// Replaces the lights by a key, a fill and a rim light for the active camera.
+/// Replaces the lights by a key, a fill and a rim light for the active camera; in a room that is open on one side, by a
+/// lamp under the ceiling and a fill light at the camera.
 pub fn light_from_camera(scene: &mut Scene) {
-    scene.lights = studio_lights(scene.camera());
+    scene.lights = match Room::of(scene) {
+        Some(room) => room.lights(scene.camera()),
+        None => studio_lights(scene.camera()),
+    };
 }
 
 /// A camera that sees the whole scene from a direction and fills the picture with it.

@@ -10,6 +10,7 @@ pub mod material;
 pub mod needs;
 pub mod object;
 pub mod origin;
+mod room;
 pub mod texture;
 
 pub use background::Background;
