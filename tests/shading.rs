@@ -209,6 +209,29 @@ fn light_does_not_leak_out_of_a_closed_cube() {
 }
 
 #[test]
+fn a_lamp_on_a_ceiling_shines_at_every_angle() {
+    // 0.5488 is not a number of f32: the ceiling's plane lies 8e-9 below the lamp of the file.
+    let height = 0.5488;
+    let mut scene = empty_scene();
+    let corner = DVec3::new(-1.0, height, -1.0).as_vec3();
+    add_mesh(&mut scene, rectangle(corner, Vec3::X * 2.0, Vec3::Z * 2.0), DAffine3::IDENTITY, white());
+    add_mesh(
+        &mut scene,
+        rectangle(Vec3::new(-1.0, -1.0, -1.0), Vec3::X * 2.0, Vec3::Y * 2.0),
+        DAffine3::IDENTITY,
+        white(),
+    );
+    let lamp = DVec3::new(0.1, height, 0.3);
+    add_light(&mut scene, lamp, Rgb::ONE);
+    for drop in [0.5, 0.1, 0.01, 1e-3, 1e-4, 1e-5, 1e-6] {
+        let point = DVec3::new(0.2, height - drop, -1.0);
+        look(&mut scene, DVec3::new(0.2, height - 0.3, 0.5), point);
+        let n_dot_l = (lamp - point).normalize().z;
+        near(pixel(&scene), Rgb::splat(n_dot_l as f32), 1e-6);
+    }
+}
+
+#[test]
 fn spots_and_falloff_follow_their_definitions() {
     let mut scene = empty_scene();
     add_mesh(

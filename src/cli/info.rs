@@ -175,7 +175,7 @@ impl<'a> Info<'a> {
             meshes: scene.meshes.len(),
             instances: scene.objects.len(),
             quadrics: scene.quadrics.len(),
-            materials: scene.materials.iter().map(|material| material.name.clone()).collect(),
+            materials: used_names(scene),
             textures: scene.textures.iter().map(texture).collect(),
             lights: scene.lights.iter().map(light).collect(),
             cameras: scene.cameras.iter().map(|camera| camera.name.clone()).collect(),
@@ -265,6 +265,12 @@ fn bounds(scene: &Scene) -> Option<BoundsInfo> {
         }
     }
     min.cmple(max).all().then(|| BoundsInfo { min: min.to_array(), max: max.to_array() })
+}
+
+/// The names of the materials in use.
+fn used_names(scene: &Scene) -> Vec<String> {
+    let used = scene.used_materials();
+    scene.materials.iter().zip(used).filter(|(_, used)| *used).map(|(material, _)| material.name.clone()).collect()
 }
 
 #[cfg(test)]

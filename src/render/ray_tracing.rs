@@ -25,6 +25,9 @@ const STACK: usize = 16 << 20;
 /// The largest `max_depth` that [`ray_tracing`] accepts: what fits `STACK` with room to spare.
 pub const LARGEST_DEPTH: u32 = 1000;
 
+/// The most pixels that are rendered at once: 2^28, which take 6 GiB while tiles are put together.
+const LARGEST_PICTURE: u64 = 1 << 28;
+
 /// One tile's pixels, rows from the top.
 struct Tile {
     area: Crop,
@@ -64,6 +67,10 @@ pub fn ray_tracing<I: Intersect>(
             "the crop {},{},{},{} does not lie within the {}x{} picture",
             area.x0, area.y0, area.x1, area.y1, film.width, film.height
         )));
+    }
+    if u64::from(area.x1 - area.x0) * u64::from(area.y1 - area.y0) > LARGEST_PICTURE {
+        return Err(Error::limit(format!("a picture of more than {LARGEST_PICTURE} pixels does not fit in memory"))
+            .remedy("render parts of it with a crop"));
     }
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(settings.threads)

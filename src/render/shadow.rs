@@ -101,13 +101,14 @@ impl<I: Intersect> Tracer<'_, I> {
 
 /// The ray from a point to a light: direction of any length; it ends just before the light.
 ///
-/// The end is shortened by the bound that moves the start of a ray off a surface through the light, so that a lamp
-/// that lies on a ceiling shines.
+/// The end is the light's place rounded to f32, as vertices are, and shortened by a bound like that which moves the
+/// start of a ray off a surface: a lamp whose coordinates are those of a ceiling shines, at grazing angles too.
 fn shadow_ray(point: &SurfacePoint, illumination: &Illumination) -> Ray {
     let origin = point.origin_outside();
     let (direction, t_max) = match illumination.position {
         None => (illumination.to_light, f32::INFINITY),
         Some(position) => {
+            let position = to_f32(position).as_dvec3();
             let offset = position - origin.as_dvec3();
             let distance = length(offset);
             let error = gamma(7) * (position.abs().max_element() + distance);

@@ -67,7 +67,10 @@ pub struct Automatic {
 
 /// Gives a scene that came from a bare model what it lacks: a camera that frames it, lights, a background.
 pub fn complete(scene: &mut Scene) -> Automatic {
-    scene.background = Background::Gradient { bottom: Rgb::splat(0.32), top: Rgb::new(0.80, 0.84, 0.90), up: DVec3::Y };
+    // Lights in physical units come with an exposure, which is not meant for the background.
+    let level = libm::exp2f(-scene.film.exposure);
+    let (bottom, top) = (Rgb::splat(0.32) * level, Rgb::new(0.80, 0.84, 0.90) * level);
+    scene.background = Background::Gradient { bottom, top, up: DVec3::Y };
     let automatic = Automatic { camera: complete_camera(scene), lights: scene.lights.is_empty() };
     if automatic.lights {
         light_from_camera(scene);

@@ -89,6 +89,22 @@ impl Scene {
         &self.cameras[self.active_camera].camera
     }
 
+    /// Which materials some object or triangle refers to, by position.
+    pub fn used_materials(&self) -> Vec<bool> {
+        let mut used = vec![false; self.materials.len()];
+        for object in &self.objects {
+            match (object.material, object.shape) {
+                (Some(material), _) => used[material as usize] = true,
+                (None, Shape::Mesh(mesh)) => {
+                    let mesh = &self.meshes[mesh as usize];
+                    mesh.live_triangles().for_each(|number| used[mesh.material(number) as usize] = true);
+                }
+                (None, Shape::Quadric(_)) => used[0] = true,
+            }
+        }
+        used
+    }
+
     /// Number of triangles with every instance counted, dropped ones left out.
     pub fn instanced_triangles(&self) -> u64 {
         let count = |object: &Object| match object.shape {

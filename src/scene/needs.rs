@@ -32,28 +32,18 @@ pub struct Needs {
 impl Needs {
     /// Counts what `scene` uses. A material counts if some object or triangle refers to it.
     pub fn of(scene: &Scene) -> Self {
-        let mut used = vec![false; scene.materials.len()];
         let mut needs = Self { lights: scene.lights.len() as u64, ..Self::default() };
         for object in &scene.objects {
             needs.transformed_objects += u64::from(object.transform != glam::DAffine3::IDENTITY);
             match object.shape {
-                Shape::Mesh(mesh) => {
-                    needs.mesh_objects += 1;
-                    if object.material.is_none() {
-                        let mesh = &scene.meshes[mesh as usize];
-                        mesh.live_triangles().for_each(|number| used[mesh.material(number) as usize] = true);
-                    }
-                }
+                Shape::Mesh(_) => needs.mesh_objects += 1,
                 Shape::Quadric(quadric) => {
                     needs.quadric_objects += 1;
                     needs.unbounded_quadrics += u64::from(scene.quadrics[quadric as usize].bounds().is_none());
                 }
             }
-            if let Some(material) = object.material {
-                used[material as usize] = true;
-            }
         }
-        for (material, _) in scene.materials.iter().zip(used).filter(|(_, used)| *used) {
+        for (material, _) in scene.materials.iter().zip(scene.used_materials()).filter(|(_, used)| *used) {
             needs.textured_materials += u64::from(material.diffuse_texture.is_some());
             needs.reflective_materials += u64::from(material.is_reflective());
             needs.transmissive_materials += u64::from(material.is_transmissive());
