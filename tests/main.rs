@@ -5,5 +5,6 @@ mod architecture;
 #[cfg(feature = "cli")]
 mod command_line;
 mod common;
+mod golden;
 mod shading;
 mod spawned_rays;
