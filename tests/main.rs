@@ -6,5 +6,6 @@ mod architecture;
 mod command_line;
 mod common;
 mod golden;
+mod models;
 mod shading;
 mod spawned_rays;
