@@ -2,9 +2,9 @@
 
 mod accelerators;
 mod architecture;
-#[cfg(feature = "cli")]
 mod command_line;
 mod common;
+mod far_from_origin;
 mod golden;
 mod models;
 mod shading;

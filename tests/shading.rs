@@ -128,16 +128,10 @@ fn a_glass_sphere_bends_axial_and_oblique_rays_by_snells_law() {
             let mut scene = empty_scene();
             let glass = Material { kt: Rgb::ONE, ior: ior as f32, ..black() };
             add_quadric(&mut scene, shapes::sphere(), DAffine3::IDENTITY, glass);
-            // The outgoing line: leaves at the point whose polar angle follows from the chord.
+            // In the plane x = 0 the ray enters at the angle i above the z axis and leaves after the chord's angle.
             let (i, r) = (h.asin(), (h / ior).asin());
-            let exit_angle = std::f64::consts::PI - i + (std::f64::consts::PI - 2.0 * r);
-            // Travel along -z in the plane x = 0 at y = h: entry at angle i above the z axis.
-            let exit = DVec3::new(
-                0.0,
-                (i + (std::f64::consts::PI - 2.0 * r)).sin(),
-                (i + (std::f64::consts::PI - 2.0 * r)).cos(),
-            );
-            assert!(exit_angle.is_finite());
+            let exit_angle = i + (std::f64::consts::PI - 2.0 * r);
+            let exit = DVec3::new(0.0, exit_angle.sin(), exit_angle.cos());
             let direction = DVec3::new(0.0, -turn.sin(), -turn.cos());
             let on_line = exit + direction * 5.0;
             // An emitting half plane below `edge`, perpendicular to the outgoing ray.

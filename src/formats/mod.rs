@@ -15,7 +15,7 @@ use std::path::Path;
 use crate::error::{Error, Result};
 use crate::progress::Progress;
 use crate::scene::auto::{self, Automatic};
-use crate::scene::{Camera, LightKind, Projection, Scene, exposure};
+use crate::scene::{Camera, LightKind, Projection, Scene, exposure, origin};
 
 pub use ledger::{Ledger, Treatment};
 pub use model::Model;
@@ -84,13 +84,16 @@ enum Format {
 /// Names the file, and line and column where there are such, and what would mend it.
 pub fn open(path: &Path, options: &LoadOptions, progress: &dyn Progress) -> Result<Loaded> {
     if format_of(path)? == Format::Scene {
-        return scene_file::read(path, options, progress);
+        let mut loaded = scene_file::read(path, options, progress)?;
+        loaded.scene.origin = origin::choose(&loaded.scene);
+        return Ok(loaded);
     }
     let model = load_model(path, options, progress)?;
     let mut scene = Scene::default();
     let ledger = model.ledger.clone();
     let physical_lights = model.physical_lights;
     model.append_to(&mut scene);
+    scene.origin = origin::choose(&scene);
     hold_angles_in_degrees(&mut scene);
     if physical_lights {
         scene.film.exposure = exposure::automatic(&scene);

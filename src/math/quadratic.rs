@@ -65,12 +65,17 @@ mod tests {
 
     #[test]
     fn the_sign_of_a_nearly_tangent_discriminant_is_exact() {
-        // (t - r)(t - s) with r and s adjacent doubles: b^2 - a c = ((s - r) / 2)^2 > 0, which naive f64 rounds to 0.
-        let (r, s) = (1.0 + 2.0 * f64::EPSILON, 1.0 + 6.0 * f64::EPSILON);
-        let b = -0.5 * (r + s);
-        // c = r s is not representable; take a c just below b^2 instead.
-        let c = (b * b).next_down();
-        assert!(matches!(solve(1.0, b, c), Roots::Two(x, y) if x < y));
-        assert_eq!(solve(1.0, b, (b * b).next_up()), Roots::None);
+        // c is the rounded square of b: what remains is the rounding error, which naive f64 takes for 0.
+        for k in 1..1000u32 {
+            let b = -1.0 - f64::from(k) / 1024.0 - f64::EPSILON;
+            let c = b * b;
+            let (square, error) = crate::math::float::two_product(b, b);
+            assert_eq!(square, c);
+            match solve(1.0, b, c) {
+                Roots::Two(r, s) => assert!(error > 0.0 && r <= s, "{b}"),
+                Roots::One(_) => assert!(error == 0.0 || (error > 0.0 && error.sqrt() < 1e-15), "{b}"),
+                Roots::None => assert!(error < 0.0, "{b}"),
+            }
+        }
     }
 }

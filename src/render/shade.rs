@@ -75,7 +75,7 @@ impl<I: Intersect> Tracer<'_, I> {
             None => Rgb::ONE,
         };
         let diffuse = material.diffuse * texel;
-        let ambient = material.ambient.unwrap_or(self.scene.ambient * diffuse * (Rgb::ONE - material.kt));
+        let ambient = material.ambient.unwrap_or(self.scene.ambient * diffuse);
         SurfaceColors { ambient: ambient + material.emission, diffuse }
     }
 

@@ -7,7 +7,7 @@ use crate::math::float::{gamma, round_down};
 use crate::math::vector::{dot, length, normalize};
 use crate::render::intersect::Intersect;
 use crate::render::surface::SurfacePoint;
-use crate::render::trace::{SPAWNED_T_MIN, Tracer, to_f32};
+use crate::render::trace::{SPAWNED_T_MIN, Tracer};
 use crate::scene::{Falloff, Light, LightKind, Rgb};
 
 /// The light that would reach a point if nothing stood between.
@@ -24,8 +24,8 @@ pub struct Illumination {
 }
 
 impl Illumination {
-    /// What `light` sends to a point; `None` where N.L is not positive, the light is at the point, or the point lies
-    /// outside its cone: then no shadow ray is traced.
+    /// What `light` sends to a point; `None` where N.L is not positive, the light is at the point or its brightness
+    /// there overflows, or the point lies outside its cone: then no shadow ray is traced.
     pub fn at(light: &Light, point: &SurfacePoint, scene_origin: DVec3) -> Option<Self> {
         let (to_light, strength, position) = match light.kind {
             LightKind::Directional { direction } => (normalize(-direction)?, 1.0, None),
@@ -40,7 +40,9 @@ impl Illumination {
             }
         };
         let n_dot_l = dot(point.normal, to_light);
-        (n_dot_l > 0.0).then(|| Self { to_light, n_dot_l, color: light.color * (strength as f32), position })
+        // Closer to an inverse-square light than f32 can tell there is no brightness to speak of.
+        let color = (light.color.as_dvec3() * strength).as_vec3();
+        (n_dot_l > 0.0 && color.is_finite()).then_some(Self { to_light, n_dot_l, color, position })
     }
 }
 
@@ -108,12 +110,12 @@ fn shadow_ray(point: &SurfacePoint, illumination: &Illumination) -> Ray {
     let (direction, t_max) = match illumination.position {
         None => (illumination.to_light, f32::INFINITY),
         Some(position) => {
-            let position = to_f32(position).as_dvec3();
+            let position = position.as_vec3().as_dvec3();
             let offset = position - origin.as_dvec3();
             let distance = length(offset);
             let error = gamma(7) * (position.abs().max_element() + distance);
             (offset, round_down(1.0 - error / distance))
         }
     };
-    Ray { origin, t_min: SPAWNED_T_MIN, direction: to_f32(direction), t_max }
+    Ray { origin, t_min: SPAWNED_T_MIN, direction: direction.as_vec3(), t_max }
 }

@@ -39,13 +39,13 @@ pub struct TracedRay {
 impl TracedRay {
     /// A camera ray.
     pub fn camera(view: ViewRay) -> Self {
-        Self { ray: Ray::new(to_f32(view.origin), to_f32(view.direction)), view }
+        Self { ray: Ray::new(view.origin.as_vec3(), view.direction.as_vec3()), view }
     }
 
     /// A ray that leaves a surface: it starts at `offset_origin`, which is `origin` moved off the surface.
     pub(super) fn spawned(offset_origin: Vec3, origin: DVec3, direction: DVec3) -> Self {
         let ray =
-            Ray { origin: offset_origin, t_min: SPAWNED_T_MIN, direction: to_f32(direction), t_max: f32::INFINITY };
+            Ray { origin: offset_origin, t_min: SPAWNED_T_MIN, direction: direction.as_vec3(), t_max: f32::INFINITY };
         Self { ray, view: ViewRay { origin, direction } }
     }
 }
@@ -61,21 +61,22 @@ impl<'a, I: Intersect> Tracer<'a, I> {
     /// The nearest hit is shaded; a ray that hits nothing sees the background.
     #[doc(alias = "Trace")]
     pub fn trace(&self, ray: &TracedRay, depth: u32) -> Rgb {
-        let hit = self.intersect.closest(&ray.ray);
-        if hit.is_hit() {
-            self.shade(&ray.view, &hit, depth)
-        } else {
-            background(&self.scene.background, ray.view.direction)
-        }
+        self.trace_hit(ray, depth).0
     }
 
     /// What a camera ray sees and what it hit.
     pub fn trace_camera(&self, view: ViewRay) -> (Rgb, Hit) {
         self.count(|counts| counts.camera += 1);
-        let ray = TracedRay::camera(view);
+        self.trace_hit(&TracedRay::camera(view), 0)
+    }
+
+    fn trace_hit(&self, ray: &TracedRay, depth: u32) -> (Rgb, Hit) {
         let hit = self.intersect.closest(&ray.ray);
-        let color =
-            if hit.is_hit() { self.shade(&view, &hit, 0) } else { background(&self.scene.background, view.direction) };
+        let color = if hit.is_hit() {
+            self.shade(&ray.view, &hit, depth)
+        } else {
+            background(&self.scene.background, ray.view.direction)
+        };
         (color, hit)
     }
 
@@ -106,11 +107,6 @@ pub fn background(background: &Background, direction: DVec3) -> Rgb {
         }
         Background::Transparent => Rgb::ZERO,
     }
-}
-
-/// Rounds each component to the nearest f32.
-pub(super) fn to_f32(v: DVec3) -> Vec3 {
-    Vec3::new(v.x as f32, v.y as f32, v.z as f32)
 }
 
 #[cfg(test)]

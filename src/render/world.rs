@@ -1,8 +1,8 @@
 //! The scene's objects made relative to its origin and ready for rays: transforms with inverses, world boxes.
 
-use glam::{DAffine3, DVec3, Vec3};
+use glam::{DAffine3, DVec3};
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::geometry::ray::Interval;
 use crate::geometry::{Bounds, PreparedRay};
 use crate::math::Transform;
@@ -37,8 +37,16 @@ impl World {
     /// Prepares the objects of a scene.
     ///
     /// # Errors
-    /// Names the object whose transform is singular or not finite.
+    /// Names the object whose transform is singular or not finite, or the material that returns more light than it
+    /// receives.
     pub fn new(scene: &Scene) -> Result<Self> {
+        // Weights that were computed may exceed 1 by rounding.
+        const MOST: f32 = 1.0 + 4.0 * f32::EPSILON;
+        if let Some(material) = scene.materials.iter().find(|material| (material.kr + material.kt).max_element() > MOST)
+        {
+            let message = format!("material `{}`: kr + kt is more than 1 and would make light", material.name);
+            return Err(Error::caller(message));
+        }
         let mesh_bounds: Vec<Bounds> = scene.meshes.iter().map(|mesh| mesh.bounds()).collect();
         let mesh_opaque: Vec<bool> = scene
             .meshes
@@ -76,7 +84,7 @@ impl Instance {
     #[inline]
     pub fn local_ray(&self, ray: &PreparedRay, clip: Interval) -> Option<PreparedRay> {
         let (origin, direction) = self.local_line(ray.origin.as_dvec3(), ray.direction.as_dvec3());
-        PreparedRay::local(to_f32(origin), to_f32(direction), ray, clip)
+        PreparedRay::local(origin.as_vec3(), direction.as_vec3(), ray, clip)
     }
 
     /// Brings a world line into the object's space in f64.
@@ -105,8 +113,4 @@ fn relative(transform: &DAffine3, shape_origin: DVec3, scene_origin: DVec3) -> D
     let moved = m.x_axis * shape_origin.x + m.y_axis * shape_origin.y + m.z_axis * shape_origin.z;
     // The difference first: for an untransformed mesh it is an exact difference of origins, usually zero.
     DAffine3 { matrix3: m, translation: (moved - scene_origin) + transform.translation }
-}
-
-fn to_f32(v: DVec3) -> Vec3 {
-    Vec3::new(v.x as f32, v.y as f32, v.z as f32)
 }

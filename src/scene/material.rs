@@ -30,8 +30,7 @@ impl TextureRef {
 pub struct Material {
     /// For messages, overrides and `info`.
     pub name: String,
-    /// Oa. `None` is the scene's ambient factor times the diffuse colour times `1 - kt`: what goes through a surface
-    /// does not light it.
+    /// Oa. `None` is the scene's ambient factor times the diffuse colour.
     pub ambient: Option<Rgb>,
     /// Added to Oa: what the surface emits.
     pub emission: Rgb,
