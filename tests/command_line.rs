@@ -329,7 +329,7 @@ fn begin_rendering(workshop: &Workshop, flags: &str) -> (Child, impl Iterator<It
     let mut child = workshop.command(&arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
     lines.find(|line| line.starts_with("build")).expect("rendering begins");
-    std::thread::sleep(Duration::from_millis(200));
+    std::thread::sleep(Duration::from_millis(500));
     (child, lines)
 }
 
@@ -343,7 +343,7 @@ fn interrupt(child: &Child) {
 fn an_interrupt_saves_what_is_finished_and_leaves_the_picture() {
     let workshop = Workshop::new();
     workshop.write("out.png", "old");
-    let (child, lines) = begin_rendering(&workshop, "--size 1500x1500 --spp 256 -o out.png");
+    let (child, lines) = begin_rendering(&workshop, "--size 3000x3000 --spp 16 -o out.png");
     interrupt(&child);
     let told = lines.last().unwrap();
     let output = child.wait_with_output().unwrap();
@@ -352,7 +352,7 @@ fn an_interrupt_saves_what_is_finished_and_leaves_the_picture() {
     assert!(told.contains("out.partial.png"), "{told}");
     assert_eq!(fs::read(workshop.path("out.png")).unwrap(), b"old");
     let partial = image::open(workshop.path("out.partial.png")).unwrap().to_rgb8();
-    assert_eq!(partial.dimensions(), (1500, 1500));
+    assert_eq!(partial.dimensions(), (3000, 3000));
     assert!(partial.pixels().any(|pixel| pixel.0 != [0; 3]), "some tiles are finished");
     assert_eq!(workshop.names().len(), 4, "{:?}", workshop.names());
 }
@@ -364,7 +364,7 @@ fn a_second_interrupt_ends_at_once() {
     // The first interrupt takes effect between rows, and a row of this takes minutes.
     let (mut child, _lines) = begin_rendering(&workshop, "--size 64x64 --spp 1048576 -o out.png");
     interrupt(&child);
-    std::thread::sleep(Duration::from_millis(200));
+    std::thread::sleep(Duration::from_millis(500));
     assert_eq!(child.try_wait().unwrap(), None);
     interrupt(&child);
     assert_eq!(child.wait().unwrap().code(), Some(130));

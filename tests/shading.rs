@@ -1,7 +1,8 @@
 //! The shading formula, shadows, mirrors and refraction against closed forms.
 
 use glam::{DAffine3, DVec3, Vec3};
-use whitted::geometry::shapes;
+use whitted::geometry::quadric::Clip;
+use whitted::geometry::{Quadric, shapes};
 use whitted::scene::{Camera, Clamp, FilmSettings, Light, LightKind, Material, NamedCamera, Rgb};
 
 use crate::common::*;
@@ -200,6 +201,36 @@ fn light_does_not_leak_out_of_a_closed_cube() {
     }
     look(&mut scene, DVec3::new(-0.5, 0.0, 0.0), DVec3::new(1.0, 0.1, 0.2));
     assert!(pixel(&scene).x > 0.1);
+}
+
+#[test]
+fn tilted_general_quadrics_look_like_upright_ones_turned() {
+    // The paraboloid |p|^2 - (n.p)^2 = n.p within a box, seen along its axis into the bowl, lit from there.
+    for n in [
+        DVec3::new(0.0, 1.0, 0.0),
+        DVec3::new(2.0, 3.0, 6.0) / 7.0,
+        DVec3::new(1.0, 4.0, 8.0) / 9.0,
+        DVec3::new(0.6, 0.8, 0.0),
+    ] {
+        let l = n * -0.5;
+        let coefficients =
+            [1.0 - n.x * n.x, 1.0 - n.y * n.y, 1.0 - n.z * n.z, -n.x * n.y, -n.y * n.z, -n.x * n.z, l.x, l.y, l.z, 0.0];
+        // Without end it shades itself at 1e15 from any sun that is not exactly on its axis: the clip is needed.
+        assert!(Quadric::new(coefficients, None, false).unwrap().bounds().is_none());
+        let mut scene = empty_scene();
+        let clip = Clip { min: DVec3::splat(-1.0), max: DVec3::ONE };
+        let quadric = Quadric::new(coefficients, Some(clip), false).unwrap();
+        add_quadric(&mut scene, quadric, DAffine3::IDENTITY, white());
+        scene.lights =
+            vec![Light { name: "sun".into(), kind: LightKind::Directional { direction: -n }, color: Rgb::ONE }];
+        // At the radius r the height is r^2, the slope 2 r, and N.L = 1 / sqrt(1 + 4 r^2).
+        let across = n.any_orthonormal_vector();
+        for r in [0.0, 0.1, 0.3] {
+            let point = across * r + n * (r * r);
+            look(&mut scene, point + n * 5.0 + across * 0.5, point);
+            near(pixel(&scene), Rgb::splat((1.0 / (1.0 + 4.0 * r * r).sqrt()) as f32), 1e-6);
+        }
+    }
 }
 
 #[test]

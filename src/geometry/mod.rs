@@ -4,6 +4,7 @@ pub mod bounds;
 pub mod hit;
 pub mod mesh;
 pub mod quadric;
+pub mod quadric_form;
 pub mod ray;
 pub mod shapes;
 pub mod triangle;

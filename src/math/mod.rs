@@ -3,6 +3,7 @@
 //! No fused multiply-add, no reassociation, no platform `pow` or trigonometry: sums are spelled out in one order, and
 //! transcendental functions come from the crate `libm`, which is pure Rust.
 
+pub mod eigen;
 pub mod float;
 pub mod origin;
 pub mod quadratic;
