@@ -29,7 +29,7 @@ pub enum Fault {
 /// What went wrong, where, and what would mend it.
 ///
 /// [`fmt::Display`] writes one line: `path:line:column: message; remedy`. Parts that are not known are left out.
-#[derive(Debug, Clone, thiserror::Error)]
+#[derive(Clone, thiserror::Error)]
 pub struct Error {
     fault: Fault,
     message: String,
@@ -150,6 +150,13 @@ impl fmt::Display for Error {
             write!(f, "; {remedy}")?;
         }
         Ok(())
+    }
+}
+
+/// As [`fmt::Display`], so that a program whose `main` returns this error prints the one line.
+impl fmt::Debug for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
     }
 }
 

@@ -70,6 +70,8 @@ pub mod render;
 pub mod scene;
 
 pub use error::{Error, Fault, Result};
+/// The vectors of the public interface, in the version that it uses.
+pub use glam;
 
 /// The README's examples are compiled with the documentation tests.
 #[cfg(doctest)]

@@ -66,8 +66,9 @@ impl Bounds {
 
     /// A box in world space around everything in this object-space box, rounded outward.
     ///
-    /// It allows for the rounding of a ray that is brought into object space: 3 gamma of the size of the coordinates
-    /// involved (Pharr et al. 2023, 6.8.6).
+    /// It allows for the rounding of the transform: 3 gamma of the magnitudes summed (Pharr et al. 2023, 6.8.6). A ray
+    /// that is brought into object space is rounded as well, by up to an ulp of its own origin there; a hit which that
+    /// moves out of the box is clamped back into it.
     pub fn to_world(&self, transform: &Transform) -> Self {
         if self.is_empty() || transform.is_identity() {
             return *self;

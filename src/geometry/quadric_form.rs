@@ -70,7 +70,7 @@ impl QuadricForm {
                 }
             }
         }
-        form.center = form.from_axes(center);
+        form.center = form.to_object(center);
         form.squares = squares;
         form.linear = linear;
         form
@@ -111,12 +111,12 @@ impl QuadricForm {
     /// The object-space point at `s` on a line.
     #[inline]
     pub fn point(&self, along: &Along, s: f64) -> DVec3 {
-        self.center + self.from_axes(along.start + along.direction * s)
+        self.center + self.to_object(along.start + along.direction * s)
     }
 
     /// Half the gradient at `s` on a line, object space.
     pub fn gradient(&self, along: &Along, s: f64) -> DVec3 {
-        self.from_axes(self.squares * (along.start + along.direction * s) + self.linear)
+        self.to_object(self.squares * (along.start + along.direction * s) + self.linear)
     }
 
     /// The box around `F = 0` if that is an ellipsoid: least and greatest corner, object space.
@@ -145,7 +145,7 @@ impl QuadricForm {
     }
 
     #[inline(always)]
-    fn from_axes(&self, y: DVec3) -> DVec3 {
+    fn to_object(&self, y: DVec3) -> DVec3 {
         match &self.axes {
             None => y,
             Some([x_axis, y_axis, z_axis]) => *x_axis * y.x + *y_axis * y.y + *z_axis * y.z,
