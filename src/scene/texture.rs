@@ -39,6 +39,17 @@ pub enum Texels {
     Linear32(Arc<[[f32; 3]]>),
 }
 
+impl Texels {
+    /// Whether both are one piece of memory; equal texels of two images are not.
+    pub fn is_shared_with(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Srgb8(own), Self::Srgb8(other)) => Arc::ptr_eq(own, other),
+            (Self::Linear32(own), Self::Linear32(other)) => Arc::ptr_eq(own, other),
+            _ => false,
+        }
+    }
+}
+
 /// An image and how to read it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Texture {

@@ -213,10 +213,14 @@ impl Reader<'_> {
         Ok(texture)
     }
 
-    /// Adds a texture unless the scene has it; its number.
+    /// Adds a texture made of an [`image`](Self::image) unless the scene has it; its number.
+    ///
+    /// The texels tell, which this reader's textures share if they are of one file. A name tells nothing: an image
+    /// embedded in a model may be called anything.
     pub fn add_texture(&mut self, texture: Texture) -> u32 {
-        let same =
-            |other: &Texture| (&other.name, other.wrap, other.filter) == (&texture.name, texture.wrap, texture.filter);
+        let same = |other: &Texture| {
+            other.texels.is_shared_with(&texture.texels) && (other.wrap, other.filter) == (texture.wrap, texture.filter)
+        };
         let number = self.scene.textures.iter().position(same).unwrap_or_else(|| {
             self.scene.textures.push(texture);
             self.scene.textures.len() - 1

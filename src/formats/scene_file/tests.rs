@@ -359,6 +359,45 @@ fn meshes_are_shared_replaced_and_overridden() {
 }
 
 #[test]
+fn images_of_models_and_of_the_scene_are_told_apart_whatever_they_are_called() {
+    let folder = folder_with("");
+    let own = folder.path().join("t.png");
+    // A model whose embedded image is called as the path of the scene's own.
+    let data = |file: &str| {
+        let bytes = std::fs::read(folder.path().join(file)).unwrap();
+        bytes.iter().map(|byte| format!("%{byte:02x}")).collect::<String>()
+    };
+    image::RgbImage::from_pixel(1, 1, image::Rgb([255; 3])).save(folder.path().join("white.png")).unwrap();
+    let mut buffer: Vec<u8> =
+        [0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].iter().flat_map(|x| x.to_le_bytes()).collect();
+    buffer.resize(36, 0);
+    std::fs::write(folder.path().join("m.bin"), buffer).unwrap();
+    let gltf = serde_json::json!({
+        "asset": {"version": "2.0"}, "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "material": 0}]}],
+        "materials": [{"name": "paper", "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
+        "textures": [{"source": 0}],
+        "images": [{"name": own, "uri": format!("data:image/png,{}", data("white.png"))}],
+        "buffers": [{"byteLength": 36, "uri": "m.bin"}], "bufferViews": [{"buffer": 0, "byteLength": 36}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3",
+            "min": [0, 0, 0], "max": [1, 1, 0]}],
+    });
+    std::fs::write(folder.path().join("m.gltf"), gltf.to_string()).unwrap();
+    let text = "[[object]]\nmesh = \"m.gltf\"\n[[object]]\nmesh = \"m.obj\"\n\
+        [[override]]\nmaterial = \"paper\"\ntexture = \"t.png\"\n\
+        [[override]]\nmaterial = \"red\"\ntexture = \"./t.png\"\n";
+    std::fs::write(folder.path().join("s.toml"), text).unwrap();
+    let Loaded { scene, ledger, .. } = opened(&folder, "s.toml").unwrap();
+    assert!(ledger.entries().all(|(treatment, ..)| treatment != formats::Treatment::Warning), "the image is read");
+    let texture = |material: &str| {
+        let material = scene.materials.iter().find(|m| m.name == material).unwrap();
+        material.diffuse_texture.unwrap().texture
+    };
+    assert_eq!(scene.textures[texture("paper") as usize].width, 2, "the scene's image, not the model's");
+    assert_eq!(texture("paper"), texture("red"), "one file is one texture, however it is written");
+}
+
+#[test]
 fn an_override_lists_the_imported_names() {
     let folder = folder_with("[[object]]\nmesh = \"m.obj\"\n[[override]]\nmaterial = \"rad\"\n");
     let message = opened(&folder, "s.toml").unwrap_err().to_string();
