@@ -8,13 +8,11 @@ use clap_complete::Shell;
 use super::values::{self, Orbit, one_of};
 use crate::accel::{Kind, Params, Preset};
 use crate::formats::{LoadOptions, NormalMode, UpAxis};
-use crate::render::ray_tracing::LARGEST_DEPTH;
 use crate::render::{AovKind, Crop, RenderSettings};
 use crate::scene::auto::View;
+use crate::scene::film::{LARGEST_DEPTH, MOST_SAMPLES};
 use crate::scene::{Clamp, FilmSettings, Transfer};
 
-/// Samples a pixel beyond which nothing visible changes any more.
-const MOST_SAMPLES: u32 = 1 << 20;
 /// Far more threads than any machine has processors.
 const MOST_THREADS: u32 = 4096;
 

@@ -6,9 +6,7 @@ use std::str::FromStr;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use crate::render::Crop;
-
-/// The longest side of a picture, in pixels.
-const LONGEST_SIDE: u32 = 65_536;
+use crate::scene::film::{LARGEST_EXPOSURE, LONGEST_SIDE};
 
 /// Accepts one of these names and gives what stands beside it.
 pub fn one_of<T: Copy + Send + Sync + 'static>(
@@ -74,8 +72,8 @@ pub fn field_of_view(text: &str) -> Result<f64, String> {
 /// Reads an exposure in stops.
 pub fn exposure(text: &str) -> Result<f32, String> {
     match text.parse::<f32>() {
-        Ok(stops) if stops.abs() <= 100.0 => Ok(stops),
-        _ => Err("expected stops between -100 and 100; each doubles the light".into()),
+        Ok(stops) if stops.abs() <= LARGEST_EXPOSURE => Ok(stops),
+        _ => Err(format!("expected stops between -{LARGEST_EXPOSURE} and {LARGEST_EXPOSURE}; each doubles the light")),
     }
 }
 
@@ -134,7 +132,7 @@ mod tests {
     #[test]
     fn exposures_are_finite() {
         assert_eq!(exposure("-1.5"), Ok(-1.5));
-        for bad in ["inf", "nan", "101", "bright"] {
+        for bad in ["inf", "nan", "127", "bright"] {
             assert!(exposure(bad).is_err(), "{bad}");
         }
     }

@@ -19,11 +19,9 @@ use crate::scene::{Background, Scene};
 /// Side of a tile in pixels: 32 x 32 pixels keep a thread busy for long enough and share well.
 const TILE: u32 = 32;
 
-/// Stack of a rendering thread: room for the deepest recursion that is allowed (a frame is well below 2 KiB).
+/// Stack of a rendering thread: room for a recursion of [`LARGEST_DEPTH`](crate::scene::film::LARGEST_DEPTH) (a frame
+/// is well below 2 KiB).
 const STACK: usize = 16 << 20;
-
-/// The largest `max_depth` that [`ray_tracing`] accepts: what fits `STACK` with room to spare.
-pub const LARGEST_DEPTH: u32 = 1000;
 
 /// The most pixels that are rendered at once: 2^28, which take 6 GiB while tiles are put together.
 const LARGEST_PICTURE: u64 = 1 << 28;
@@ -43,7 +41,7 @@ struct Tile {
 /// with `complete` false.
 ///
 /// # Errors
-/// A degenerate camera, a crop outside the picture, a depth beyond [`LARGEST_DEPTH`], or no thread to be had.
+/// A degenerate camera, a film beyond its limits, a crop outside the picture, or no thread to be had.
 #[doc(alias = "RayTracing")]
 pub fn ray_tracing<I: Intersect>(
     scene: &Scene,
@@ -53,13 +51,7 @@ pub fn ray_tracing<I: Intersect>(
     progress: &dyn Progress,
 ) -> Result<Film> {
     let film = &scene.film;
-    if film.width == 0 || film.height == 0 || film.samples == 0 {
-        return Err(Error::caller("the picture needs at least one pixel and one sample"));
-    }
-    if film.max_depth > LARGEST_DEPTH {
-        let depth = film.max_depth;
-        return Err(Error::limit(format!("a depth of {depth} is more than the {LARGEST_DEPTH} supported")));
-    }
+    film.check()?;
     let camera = scene.camera().rays(film.width, film.height, scene.origin)?;
     let area = settings.crop.unwrap_or(Crop { x0: 0, y0: 0, x1: film.width, y1: film.height });
     if !(area.x0 < area.x1 && area.y0 < area.y1 && area.x1 <= film.width && area.y1 <= film.height) {

@@ -9,9 +9,11 @@ use super::save_model_scene;
 use crate::error::Result;
 use crate::formats::{self, LoadOptions, Loaded, NormalMode, UpAxis};
 use crate::progress::Silent;
+use crate::scene::film::{LARGEST_DEPTH, LARGEST_EXPOSURE, LONGEST_SIDE, MOST_SAMPLES};
 use crate::scene::texture::{Filter, Wrap};
 use crate::scene::{
-    Background, Camera, Clamp, Falloff, Light, LightKind, NamedCamera, Projection, Rgb, Scene, Shape, Transfer,
+    Background, Camera, Clamp, Falloff, FilmSettings, Light, LightKind, NamedCamera, Projection, Rgb, Scene, Shape,
+    Transfer,
 };
 
 fn parsed(text: &str) -> Result<Loaded> {
@@ -56,8 +58,9 @@ const MISTAKES: &[(&str, &str)] = &[
     ("[camera]\neye = [0, 0, \"a\"]\ntarget = [0, 0, 0]", "2:14: `eye` must be a number, not \"a\""),
     ("[camera]\neye = [0, 0, nan]\ntarget = [0, 0, 0]", "2:14: `eye` must be a number, not nan"),
     ("[camera]\neye = [0, inf, 0]\ntarget = [0, 0, 0]", "2:11: `eye` must be a number, not inf"),
-    ("[film]\nwidth = 0", "2:9: `width` must be a whole number from 1 to 65535, not 0"),
-    ("[film]\nsamples = 1.5", "2:11: `samples` must be a whole number from 1 to 65536, not 1.5"),
+    ("[film]\nwidth = 0", "2:9: `width` must be a whole number from 1 to 65536, not 0"),
+    ("[film]\nsamples = 1.5", "2:11: `samples` must be a whole number from 1 to 1048576, not 1.5"),
+    ("[film]\nmax_depth = 1001", "2:13: `max_depth` must be a whole number from 0 to 1000, not 1001"),
     ("[film]\nclamp = \"none\"", "2:9: `clamp` must be \"shade\" or \"output\", not \"none\""),
     (
         "[camera]\nkind = \"fisheye\"",
@@ -460,6 +463,23 @@ fn a_saved_scene_reads_back_to_the_bit() {
     assert!(save_model_scene(&scene, &model, &options, &folder.path().join("a.txt")).is_err());
     let message = save_model_scene(&read, &to, &options, &folder.path().join("b.toml")).unwrap_err().to_string();
     assert!(message.contains("is a scene file already"), "{message}");
+}
+
+#[test]
+fn films_at_the_limits_are_saved_and_read_back() {
+    let folder = folder_with("");
+    let (model, to) = (folder.path().join("m.obj"), folder.path().join("saved.toml"));
+    let options = LoadOptions::default();
+    let mut scene = formats::open(&model, &options, &Silent).unwrap().scene;
+    for (side, samples, max_depth, exposure) in
+        [(1, 1, 0, -LARGEST_EXPOSURE), (LONGEST_SIDE, MOST_SAMPLES, LARGEST_DEPTH, LARGEST_EXPOSURE)]
+    {
+        let film = FilmSettings { width: side, height: side, samples, max_depth, exposure, ..scene.film };
+        assert!(film.check().is_ok());
+        scene.film = film;
+        save_model_scene(&scene, &model, &options, &to).unwrap();
+        assert_eq!(formats::open(&to, &options, &Silent).unwrap().scene.film, film);
+    }
 }
 
 #[test]

@@ -6,6 +6,7 @@ use crate::error::Result;
 use crate::formats::scene_file::read::Reader;
 use crate::formats::scene_file::value::{Fields, Value};
 use crate::math::vector::normalize;
+use crate::scene::film::{LARGEST_DEPTH, LARGEST_EXPOSURE, LONGEST_SIDE, MOST_SAMPLES};
 use crate::scene::{Background, Camera, Clamp, FilmSettings, Projection, Transfer};
 
 /// Vertical field of view where a perspective camera gives none, degrees.
@@ -81,8 +82,7 @@ pub fn default_film(camera: Option<&Camera>) -> FilmSettings {
 
 /// The film.
 pub fn read_film(fields: &Fields<'_>, default: FilmSettings) -> Result<FilmSettings> {
-    /// Most pixels along a side: JPEG's limit, and 16 GiB of floats.
-    const SIDE: std::ops::RangeInclusive<u32> = 1..=65535;
+    const SIDE: std::ops::RangeInclusive<u32> = 1..=LONGEST_SIDE;
     fields.accept(&["width", "height", "size", "samples", "max_depth", "clamp", "transfer", "exposure"])?;
     let mut film = default;
     if let Some(size) = fields.get("size") {
@@ -94,14 +94,14 @@ pub fn read_film(fields: &Fields<'_>, default: FilmSettings) -> Result<FilmSetti
     }
     film.width = fields.or("width", film.width, |value| value.whole(SIDE))?;
     film.height = fields.or("height", film.height, |value| value.whole(SIDE))?;
-    film.samples = fields.or("samples", film.samples, |value| value.whole(1..=65536))?;
-    film.max_depth = fields.or("max_depth", film.max_depth, |value| value.whole(0..=255))?;
+    film.samples = fields.or("samples", film.samples, |value| value.whole(1..=MOST_SAMPLES))?;
+    film.max_depth = fields.or("max_depth", film.max_depth, |value| value.whole(0..=LARGEST_DEPTH))?;
     let clamps = [("shade", Clamp::Shade), ("output", Clamp::Output)];
     film.clamp = fields.or("clamp", film.clamp, |value| value.choice(&clamps))?;
     let transfers = [("srgb", Transfer::Srgb), ("linear", Transfer::Linear)];
     film.transfer = fields.or("transfer", film.transfer, |value| value.choice(&transfers))?;
-    // 2 to the exposure stays a normal f32.
-    let exposure = fields.or("exposure", f64::from(film.exposure), |value| value.between(-126.0..=126.0))?;
+    let exposures = f64::from(-LARGEST_EXPOSURE)..=f64::from(LARGEST_EXPOSURE);
+    let exposure = fields.or("exposure", f64::from(film.exposure), |value| value.between(exposures))?;
     film.exposure = exposure as f32;
     Ok(film)
 }
