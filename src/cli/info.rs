@@ -15,8 +15,9 @@ use crate::formats::{self, Ledger, Loaded, Treatment};
 use crate::geometry::TriangleMesh;
 use crate::geometry::mesh::{DroppedCounts, Materials};
 use crate::render::{BuildStats, Renderer};
+use crate::scene::extent::Extents;
 use crate::scene::needs::Needs;
-use crate::scene::{FilmSettings, LightKind, Scene, Shape};
+use crate::scene::{FilmSettings, LightKind, Scene};
 
 /// The whole document.
 #[derive(Debug, Serialize)]
@@ -252,18 +253,10 @@ fn light_kind(kind: &LightKind) -> &'static str {
 
 /// The box around every object's own box, in the file's coordinates: tight unless an object is turned or sheared.
 fn bounds(scene: &Scene) -> Option<BoundsInfo> {
-    let mesh_boxes: Vec<_> = scene.meshes.iter().map(TriangleMesh::bounds).collect();
-    let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    for object in &scene.objects {
-        let (own, origin) = match object.shape {
-            Shape::Mesh(mesh) => (Some(mesh_boxes[mesh as usize]), scene.meshes[mesh as usize].origin),
-            Shape::Quadric(quadric) => (scene.quadrics[quadric as usize].bounds(), DVec3::ZERO),
-        };
-        for corner in own.filter(|own| !own.is_empty()).iter().flat_map(|own| own.corners()) {
-            let p = object.transform.transform_point3(origin + corner.as_dvec3());
-            (min, max) = (min.min(p), max.max(p));
-        }
-    }
+    let extents = Extents::of(scene);
+    let corners = scene.objects.iter().filter_map(|object| extents.corners(scene, object)).flatten();
+    let (min, max) =
+        corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), corner| (min.min(corner), max.max(corner)));
     min.cmple(max).all().then(|| BoundsInfo { min: min.to_array(), max: max.to_array() })
 }
 
@@ -277,7 +270,7 @@ fn used_names(scene: &Scene) -> Vec<String> {
 mod tests {
     use super::*;
     use crate::geometry::shapes;
-    use crate::scene::{NamedCamera, Object, auto};
+    use crate::scene::{NamedCamera, Object, Shape, auto};
     use glam::{DAffine3, Vec3};
 
     /// One triangle far from zero, placed twice, with a second that has no area, and a sphere of radius 3.

@@ -68,7 +68,7 @@ impl DroppedCounts {
 
 /// Coordinates of larger magnitude are treated as not finite. The triangle test multiplies three differences of
 /// coordinates: 32 times the cube of this must stay below the largest f32.
-const LARGEST_COORDINATE: f32 = (1u64 << 40) as f32;
+pub const LARGEST_COORDINATE: f32 = (1u64 << 40) as f32;
 
 impl TriangleMesh {
     /// Checks the arrays against each other and lists the triangles that cannot be hit. Loaders call it once.

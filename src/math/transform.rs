@@ -64,7 +64,7 @@ impl Transform {
     /// A point from object to world space.
     #[inline]
     pub fn point_to_world(&self, p: DVec3) -> DVec3 {
-        apply(&self.to_world.matrix3, p) + self.to_world.translation
+        point(&self.to_world, p)
     }
 
     /// A direction from object to world space, not normalised.
@@ -76,7 +76,7 @@ impl Transform {
     /// A point from world to object space.
     #[inline]
     pub fn point_to_object(&self, p: DVec3) -> DVec3 {
-        apply(&self.to_object.matrix3, p) + self.to_object.translation
+        point(&self.to_object, p)
     }
 
     /// A direction from world to object space, not normalised: t is the same in both spaces.
@@ -101,11 +101,17 @@ pub fn apply(m: &DMat3, v: DVec3) -> DVec3 {
     m.x_axis * v.x + m.y_axis * v.y + m.z_axis * v.z
 }
 
+/// A point mapped by `m`: [`apply`], then the translation.
+#[inline(always)]
+pub fn point(m: &DAffine3, p: DVec3) -> DVec3 {
+    apply(&m.matrix3, p) + m.translation
+}
+
 /// The map that applies `inner`, then `outer`.
 pub fn compose(outer: &DAffine3, inner: &DAffine3) -> DAffine3 {
     let (m, n) = (&outer.matrix3, &inner.matrix3);
     let matrix3 = DMat3::from_cols(apply(m, n.x_axis), apply(m, n.y_axis), apply(m, n.z_axis));
-    DAffine3 { matrix3, translation: apply(m, inner.translation) + outer.translation }
+    DAffine3 { matrix3, translation: point(outer, inner.translation) }
 }
 
 /// A rotation by `angle` radians about the unit vector `axis` through the origin, right-handed (Rodrigues).
@@ -170,6 +176,7 @@ mod tests {
         let inner = DAffine3::from_scale_rotation_translation(DVec3::new(2.0, 1.0, -0.5), glam::DQuat::IDENTITY, shift);
         let p = DVec3::new(0.3, 0.7, 9.0);
         let expected = outer.transform_point3(inner.transform_point3(p));
+        assert!((point(&outer, point(&inner, p)) - expected).abs().max_element() < 1e-14);
         assert!((compose(&outer, &inner).transform_point3(p) - expected).abs().max_element() < 1e-14);
     }
 }

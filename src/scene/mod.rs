@@ -4,6 +4,7 @@ pub mod auto;
 pub mod background;
 pub mod camera;
 pub mod exposure;
+pub mod extent;
 pub mod film;
 pub mod light;
 pub mod material;

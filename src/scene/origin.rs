@@ -1,8 +1,9 @@
 //! Where the renderer's f32 world has its zero.
 
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 
 use crate::math::origin::choose_origin;
+use crate::scene::extent::Extents;
 use crate::scene::{Scene, Shape};
 
 /// A scene this many times farther from zero than it is large is moved; nearer ones lose at most four bits.
@@ -22,33 +23,15 @@ pub fn choose(scene: &Scene) -> DVec3 {
     if let Some(mesh) = largest {
         return mesh.origin;
     }
-    let corners = corners(scene);
+    let extents = Extents::of(scene);
+    let corners: Vec<DVec3> =
+        scene.objects.iter().filter_map(|object| extents.corners(scene, object)).flatten().collect();
     let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     for &corner in &corners {
         (min, max) = (min.min(corner), max.max(corner));
     }
     let nearest = min.max(-max).max_element();
     if nearest > FAR * (max - min).max_element() { choose_origin(&corners) } else { DVec3::ZERO }
-}
-
-/// The corners of all bounded objects' boxes, in the file's coordinates.
-fn corners(scene: &Scene) -> Vec<DVec3> {
-    let mut corners = Vec::new();
-    for object in &scene.objects {
-        let (origin, bounds) = match object.shape {
-            Shape::Mesh(mesh) => {
-                let mesh = &scene.meshes[mesh as usize];
-                (mesh.origin, Some(mesh.bounds()).filter(|bounds| !bounds.is_empty()))
-            }
-            Shape::Quadric(quadric) => (DVec3::ZERO, scene.quadrics[quadric as usize].bounds()),
-        };
-        let DMat3 { x_axis, y_axis, z_axis } = object.transform.matrix3;
-        for corner in bounds.iter().flat_map(|bounds| bounds.corners()) {
-            let p = origin + corner.as_dvec3();
-            corners.push(x_axis * p.x + y_axis * p.y + z_axis * p.z + object.transform.translation);
-        }
-    }
-    corners
 }
 
 #[cfg(test)]

@@ -30,7 +30,7 @@ pub fn read_object(fields: &Fields<'_>, number: usize, reader: &mut Reader<'_>) 
     };
     let name = fields.get("name").map(|value| reader.claim_name("object", &value)).transpose()?;
     let material = fields.get("material").map(|value| reader.material(&value)).transpose()?;
-    let places = read_places(fields)?;
+    let places = read_places(fields, &shape)?;
     let contents = if key == "mesh" {
         fields.accept(&[&["mesh"], &MESH_FIELDS[..]].concat())?;
         let options = read_load_options(fields, reader.options())?;
@@ -49,8 +49,9 @@ pub fn read_object(fields: &Fields<'_>, number: usize, reader: &mut Reader<'_>) 
         let object = Object { name, shape, transform, material: material.or(Some(0)) };
         Contents { objects: vec![object], ..Default::default() }
     };
-    for (index, place) in places.iter().enumerate() {
-        reader.place(contents.clone(), place, (places.len() > 1).then_some(index + 1));
+    reader.check_extent(&contents.objects, &format!("the shape `{key}`"), &shape)?;
+    for (index, (place, culprit)) in places.iter().enumerate() {
+        reader.place(contents.clone(), place, (places.len() > 1).then_some(index + 1), culprit)?;
     }
     Ok(())
 }
@@ -61,15 +62,17 @@ const QUADRIC_FIELDS: [&str; 4] = ["name", "material", "transform", "instances"]
 /// What objects have beside `mesh`.
 const MESH_FIELDS: [&str; 6] = ["name", "material", "transform", "instances", "normals", "up"];
 
-/// The transform of every instance: first `transform`, then that of the instance.
-fn read_places(fields: &Fields<'_>) -> Result<Vec<DAffine3>> {
-    let own = fields.or("transform", DAffine3::IDENTITY, read_transform)?;
-    let Some(instances) = fields.get("instances") else { return Ok(vec![own]) };
+/// The transform of every instance, first `transform`, then that of the instance, and the value that gave it: `shape`
+/// where none did.
+fn read_places<'a>(fields: &Fields<'a>, shape: &Value<'a>) -> Result<Vec<(DAffine3, Value<'a>)>> {
+    let transform = fields.get("transform");
+    let own = transform.as_ref().map_or(Ok(DAffine3::IDENTITY), read_transform)?;
+    let Some(instances) = fields.get("instances") else { return Ok(vec![(own, transform.unwrap_or(*shape))]) };
     let list = instances.list()?;
     if list.is_empty() {
         return Err(instances.error("`instances` is empty").remedy("leave it out for a single object"));
     }
-    list.iter().map(|instance| Ok(compose(&read_transform(instance)?, &own))).collect()
+    list.into_iter().map(|instance| Ok((compose(&read_transform(&instance)?, &own), instance))).collect()
 }
 
 fn read_load_options(fields: &Fields<'_>, default: &LoadOptions) -> Result<LoadOptions> {

@@ -15,7 +15,8 @@ use crate::formats::{Ledger, LoadOptions, Loaded, load_model};
 use crate::geometry::Quadric;
 use crate::progress::Progress;
 use crate::scene::auto::{self, Automatic};
-use crate::scene::{NamedCamera, Scene, Texture, exposure};
+use crate::scene::extent::{Extents, Misfit};
+use crate::scene::{NamedCamera, Object, Scene, Texture, exposure};
 
 /// Larger files are no scene files: meshes are files of their own.
 const MOST_BYTES: u64 = 64 << 20;
@@ -58,6 +59,7 @@ pub(super) fn parse(text: &str, path: &Path, options: &LoadOptions, progress: &d
         images: HashMap::new(),
         models: HashMap::new(),
         imported: Contents::default(),
+        extents: Extents::default(),
     };
     reader.ledger.note_file(path);
     let automatic = reader.read_scene(&Fields::root(&source, table.get_ref()))?;
@@ -73,10 +75,13 @@ pub struct Reader<'a> {
     ledger: Ledger,
     /// Names that were given, by kind of thing, and for materials their number.
     names: HashMap<(&'static str, String), u32>,
+    /// By the path that [`identity`] gives.
     images: HashMap<PathBuf, Texture>,
     models: HashMap<(PathBuf, LoadOptions), Contents>,
     /// Cameras and lights of models, placed.
     imported: Contents,
+    /// Of the scene as far as it is read.
+    extents: Extents,
 }
 
 impl Reader<'_> {
@@ -249,22 +254,44 @@ impl Reader<'_> {
         })?;
         self.ledger.merge(model.ledger.clone());
         let contents = model.append_assets(&mut self.scene);
+        self.extents.add_new(&self.scene);
         self.models.insert(key, contents.clone());
         Ok(contents)
     }
 
-    /// Puts contents into the scene; `number` tells instances apart by name.
-    pub fn place(&mut self, contents: Contents, place: &DAffine3, number: Option<usize>) {
+    /// Fails where an object is too large, too far or too small to be rendered; `what` and `culprit` are what to blame.
+    pub fn check_extent(&self, objects: &[Object], what: &str, culprit: &Value<'_>) -> Result<()> {
+        match objects.iter().find_map(|object| self.extents.misfit(&self.scene, object)) {
+            None => Ok(()),
+            Some(Misfit::TooFar) => Err(culprit
+                .error(format!("{what} reaches beyond 2^40"))
+                .remedy("make it smaller, or move it nearer to the origin")),
+            Some(Misfit::TooSmall) => {
+                Err(culprit.error(format!("{what} is too small")).remedy("sizes must lie between 2^-40 and 2^40"))
+            }
+        }
+    }
+
+    /// Puts contents into the scene; `number` tells instances apart by name, `culprit` is what gave the place.
+    pub fn place(
+        &mut self,
+        contents: Contents,
+        place: &DAffine3,
+        number: Option<usize>,
+        culprit: &Value<'_>,
+    ) -> Result<()> {
         let mut placed = contents.transformed(place);
         if let Some(number) = number {
             for object in &mut placed.objects {
                 object.name = format!("{} {number}", object.name);
             }
         }
+        self.check_extent(&placed.objects, "the object", culprit)?;
         self.scene.objects.append(&mut placed.objects);
         self.imported.cameras.append(&mut placed.cameras);
         self.imported.lights.append(&mut placed.lights);
         self.imported.physical_lights |= placed.physical_lights;
+        Ok(())
     }
 }
 

@@ -4,6 +4,7 @@ use glam::{DAffine3, DMat3, DVec3};
 
 use crate::error::Result;
 use crate::formats::scene_file::value::{Fields, Value};
+use crate::geometry::mesh::LARGEST_COORDINATE;
 use crate::geometry::quadric::{Clip, Quadric};
 use crate::geometry::shapes;
 use crate::math::vector::{basis, length, normalize};
@@ -27,7 +28,22 @@ pub const SHAPES: [&str; 11] = [
 pub type PlacedQuadric = (Quadric, DAffine3);
 
 /// The quadric that `key`, one of [`SHAPES`] but `mesh`, describes.
+///
+/// # Errors
+/// The first mistake, and radii and heights below 2^-40: in units of theirs the rest of the shape may be beyond what
+/// numbers hold. Whether the shape is too large is for the caller to find.
 pub fn read_quadric(key: &str, value: &Value<'_>) -> Result<PlacedQuadric> {
+    const SMALLEST: f64 = 1.0 / LARGEST_COORDINATE as f64;
+    let (quadric, transform) = read_shape(key, value)?;
+    let axes = transform.matrix3;
+    if [axes.x_axis, axes.y_axis, axes.z_axis].map(length).iter().any(|&size| size < SMALLEST) {
+        let error = value.error(format!("the shape `{key}` is too small"));
+        return Err(error.remedy("sizes must lie between 2^-40 and 2^40"));
+    }
+    Ok((quadric, transform))
+}
+
+fn read_shape(key: &str, value: &Value<'_>) -> Result<PlacedQuadric> {
     match key {
         "sphere" => sphere(&value.table("a sphere")?),
         "ellipsoid" => ellipsoid(&value.table("an ellipsoid")?),

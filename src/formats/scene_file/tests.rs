@@ -147,7 +147,35 @@ const MISTAKES: &[(&str, &str)] = &[
         "[[object]]\nquadric = { coefficients = [1, 1, 1, 0, 0, 0, 0, 0, 0, -1], clip = { min = [0, 0, 0], max = [inf, 0, 0] } }",
         "2:68: the clip box is empty; `min` must be less than `max` along each axis",
     ),
+    (
+        "[[object]]\nhyperboloid_one_sheet = { height = 1e-300 }",
+        "2:25: the shape `hyperboloid_one_sheet` is too small; sizes must lie between 2^-40 and 2^40",
+    ),
+    (
+        "[[object]]\nsaddle = { half_size = 1e200 }",
+        "2:10: the shape `saddle` reaches beyond 2^40; make it smaller, or move it nearer to the origin",
+    ),
+    (
+        "[[object]]\nhyperboloid_two_sheets = { limit = 1e300 }",
+        "2:26: the shape `hyperboloid_two_sheets` reaches beyond 2^40; make it smaller, or move it nearer to the origin",
+    ),
+    (
+        "[[object]]\nsphere = { radius = 1e-200 }",
+        "2:10: the shape `sphere` is too small; sizes must lie between 2^-40 and 2^40",
+    ),
+    (
+        "[[object]]\nplane = { point = [0, -1e13, 0] }",
+        "2:9: the shape `plane` reaches beyond 2^40; make it smaller, or move it nearer to the origin",
+    ),
     // Transforms.
+    (
+        "[[object]]\nsphere = {}\ntransform = { scale = 1e60 }",
+        "3:13: the object reaches beyond 2^40; make it smaller, or move it nearer to the origin",
+    ),
+    (
+        "[[object]]\nsphere = {}\ninstances = [{ scale = 2 }, { translate = [0, 1e300, 0] }]",
+        "3:29: the object reaches beyond 2^40; make it smaller, or move it nearer to the origin",
+    ),
     (
         "[[object]]\nsphere = {}\ntransform = { scale = 0 }",
         "3:13: the transform is singular or not finite; scales must not be 0",
