@@ -1,0 +1,74 @@
+//! Builds end, in time and when told to, and describe themselves.
+
+use std::time::{Duration, Instant};
+
+use glam::Vec3;
+
+use super::meshes::{soup, sphere};
+use crate::accel::{Kind, Params, Preset, TriangleAccelerator, dispatch_kind};
+use crate::geometry::{Hit, PreparedRay, Ray, TriangleMesh};
+use crate::progress::{Progress, Silent};
+
+/// Builds, and fails where that takes unreasonably long or the tree is unreasonably deep.
+fn build_in_time<A: TriangleAccelerator>(name: &str, mesh: &TriangleMesh, preset: Preset) -> A {
+    let start = Instant::now();
+    let accelerator = A::build(mesh, &Params { preset, ..Params::default() }, &Silent).unwrap();
+    let (took, stats) = (start.elapsed(), accelerator.stats());
+    eprintln!("{name} {} {preset:?} {took:?} {stats:?}", A::NAME);
+    assert!(took < Duration::from_secs(10), "{name}, {} {preset:?}: {took:?}", A::NAME);
+    assert!(stats.max_depth <= 1000, "{name}, {} {preset:?}: {stats:?}", A::NAME);
+    accelerator.validate().unwrap();
+    accelerator
+}
+
+/// What makes builders that merge neighbours slow and deep: boxes that coincide, share their centre, or tie in a row.
+#[test]
+fn coincident_and_regular_triangles_build_quickly() {
+    const COUNT: usize = 10_000;
+    let triangle = [Vec3::new(0.0, 0.0, 1.0), Vec3::new(1.0, 0.0, 1.0), Vec3::new(0.0, 1.0, 1.0)];
+    let identical = soup(&vec![triangle; COUNT]);
+    let shell = |i: usize| {
+        let size = 1.001f32.powi(i as i32);
+        [Vec3::new(-size, -size, 0.0), Vec3::new(size, -size, 0.0), Vec3::new(size, size, 0.0)]
+    };
+    let nested = soup(&(0..COUNT).map(shell).collect::<Vec<_>>());
+    let strip = soup(&(0..COUNT).map(|i| triangle.map(|p| p + Vec3::X * i as f32)).collect::<Vec<_>>());
+    let ray = PreparedRay::new(&Ray::new(Vec3::new(0.25, 0.25, 0.0), Vec3::Z)).unwrap();
+    for &kind in &Kind::ALL[1..] {
+        for &preset in Preset::ALL {
+            dispatch_kind!(kind, A => {
+                build_in_time::<A>("nested", &nested, preset);
+                build_in_time::<A>("strip", &strip, preset);
+                let accelerator: A = build_in_time("identical", &identical, preset);
+                let mut best = Hit::MISS;
+                accelerator.closest(&ray, 0, &mut best);
+                assert_eq!((best.t, best.primitive), (1.0, 0));
+                let mut next = Hit::MISS;
+                accelerator.next_after(&ray, 0, best.key(), &mut next);
+                assert_eq!((next.t, next.primitive), (1.0, 1));
+            });
+        }
+    }
+}
+
+#[test]
+fn cancelled_builds_stop() {
+    struct Cancelled;
+    impl Progress for Cancelled {
+        fn is_cancelled(&self) -> bool {
+            true
+        }
+    }
+    for &kind in Kind::ALL {
+        dispatch_kind!(kind, A => assert!(A::build(&sphere(4, 4), &Params::default(), &Cancelled).is_err()));
+    }
+}
+
+#[test]
+fn kinds_have_their_names() {
+    for &kind in Kind::ALL {
+        assert_eq!(dispatch_kind!(kind, A => A::NAME), kind.name());
+        assert_eq!(serde_json::to_value(kind).unwrap(), kind.name());
+    }
+    assert!(Kind::ALL.contains(&Kind::Auto.resolve()));
+}

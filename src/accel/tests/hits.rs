@@ -1,0 +1,165 @@
+//! Structures give the same hits as `linear`, bit for bit, on ordinary and on hard rays.
+
+use glam::Vec3;
+
+use super::compare::{compare, compare_on_hard_rays, prepare, rays_at};
+use super::meshes::{Random, grid, random_soup, soup, sphere, transformed};
+use crate::accel::{Kind, Linear, Params, TriangleAccelerator, dispatch_kind};
+use crate::geometry::{Hit, PreparedRay, Ray, TriangleMesh};
+use crate::progress::Silent;
+
+#[test]
+fn random_soups_of_all_sizes() {
+    let mut random = Random::new(1);
+    for count in [1, 2, 3, 4, 5, 8, 9, 17, 40, 400] {
+        let soup = random_soup(&mut random, count, 0.4);
+        compare_on_hard_rays(&format!("soup of {count}"), &soup, 200);
+    }
+}
+
+#[test]
+fn scales_and_places_far_from_the_origin() {
+    let soup = random_soup(&mut Random::new(2), 150, 0.4);
+    for scale in [1e-12, 1e-6, 1e-3, 1e3, 1e6, 1e11] {
+        compare_on_hard_rays(&format!("scale {scale}"), &transformed(&soup, scale, Vec3::ZERO), 150);
+    }
+    let ball = sphere(8, 12);
+    for shift in [Vec3::new(1e4, -3e4, 2e4), Vec3::new(148_376.0, 1234.0, -223_423.0), Vec3::splat(3e6)] {
+        compare_on_hard_rays(&format!("sphere at {shift}"), &transformed(&ball, 1.0, shift), 300);
+    }
+}
+
+#[test]
+fn axis_flat_grids() {
+    for axis in 0..3 {
+        for height in [0.0, 0.1, -1000.1] {
+            compare_on_hard_rays(&format!("grid {axis} at {height}"), &grid(12, axis, height), 200);
+        }
+    }
+}
+
+#[test]
+fn slivers() {
+    let mut random = Random::new(3);
+    let sliver = |random: &mut Random| {
+        let (a, along) = (random.vector(), random.vector());
+        [a, a + along, a + along * random.unit() + random.vector() * 1e-4]
+    };
+    let slivers: Vec<_> = (0..200).map(|_| sliver(&mut random)).collect();
+    compare_on_hard_rays("slivers", &soup(&slivers), 400);
+}
+
+#[test]
+fn one_huge_triangle_among_tiny_ones() {
+    let mut random = Random::new(4);
+    let mut triangles: Vec<_> = (0..200).map(|_| [(); 3].map(|()| random.vector() * 1e-3)).collect();
+    triangles.push([Vec3::new(-1e8, -1e8, 0.0), Vec3::new(1e8, -1e8, 0.0), Vec3::new(0.0, 1e8, 0.0)]);
+    let soup = soup(&triangles);
+    let mut rays = rays_at(&soup, &mut random, 200);
+    rays.extend((0..200).map(|_| Ray::new(random.vector(), random.vector())));
+    assert!(compare("huge among tiny", &soup, &prepare(&rays, &mut random)) > 50);
+}
+
+/// A ray whose interval ends exactly at a hit, or just before or after it.
+#[test]
+fn interval_ends_at_exact_hit_distances() {
+    let mut random = Random::new(5);
+    let soup = random_soup(&mut random, 100, 0.6);
+    let linear = Linear::build(&soup, &Params::default(), &Silent).unwrap();
+    let mut rays = Vec::new();
+    for ray in rays_at(&soup, &mut random, 200) {
+        let Some(prepared) = PreparedRay::new(&ray) else { continue };
+        let mut hit = Hit::MISS;
+        linear.closest(&prepared, 0, &mut hit);
+        if hit.is_hit() {
+            for t in [hit.t.next_down(), hit.t, hit.t.next_up()] {
+                rays.extend([
+                    Ray { t_min: t, t_max: f32::INFINITY, ..ray },
+                    Ray { t_max: t, ..ray },
+                    Ray { t_min: t, t_max: t, ..ray },
+                ]);
+            }
+        }
+    }
+    let rays: Vec<_> = rays.iter().filter_map(PreparedRay::new).collect();
+    assert!(compare("interval ends", &soup, &rays) > rays.len() / 4);
+}
+
+/// A better hit that is known already must survive, and ties go by instance.
+#[test]
+fn hits_that_are_known_already() {
+    let mut random = Random::new(6);
+    let soup = random_soup(&mut random, 100, 0.6);
+    let rays: Vec<_> = rays_at(&soup, &mut random, 300).iter().filter_map(PreparedRay::new).collect();
+    let mut first = vec![Hit::MISS; rays.len()];
+    let linear = Linear::build(&soup, &Params::default(), &Silent).unwrap();
+    linear.closest_batch(&rays, 5, &mut first);
+    for &kind in Kind::ALL {
+        for (instance, expected) in [(4, 4), (6, 5)] {
+            let mut best = first.clone();
+            dispatch_kind!(kind, A => {
+                A::build(&soup, &Params::default(), &Silent).unwrap().closest_batch(&rays, instance, &mut best);
+            });
+            for (best, first) in best.iter().zip(&first) {
+                let expected = if first.is_hit() { Hit { instance: expected, ..*first } } else { Hit::MISS };
+                assert_eq!(best, &expected, "{}", kind.name());
+            }
+        }
+    }
+}
+
+/// The 48 by 96 sphere whose vertices and edges other tracers leak through: nothing may get out.
+#[test]
+fn a_closed_sphere_has_no_leaks() {
+    const RAYS: usize = 120_000;
+    let ball = sphere(48, 96);
+    let mut random = Random::new(7);
+    let rays: Vec<Ray> = (0..RAYS)
+        .map(|number| {
+            let origin = random.vector();
+            let [a, b, _] = ball.triangle(random.below(ball.indices.len()) as u32);
+            let target = if number % 2 == 0 { a } else { a + (b - a) * random.unit() };
+            let direction = target - origin;
+            Ray::new(origin, if number % 4 < 2 { direction } else { direction.normalize() })
+        })
+        .collect();
+    let prepared: Vec<_> = rays.iter().map(|ray| PreparedRay::new(ray).unwrap()).collect();
+    let mut hits = Vec::new();
+    for &kind in &Kind::ALL[1..] {
+        dispatch_kind!(kind, A => {
+            let accelerator = A::build(&ball, &Params::default(), &Silent).unwrap();
+            let mut best = vec![Hit::MISS; RAYS];
+            accelerator.closest_batch(&prepared, 0, &mut best);
+            let mut occluded = vec![false; RAYS];
+            accelerator.occluded_batch(&prepared, &mut occluded);
+            let missed = best.iter().filter(|hit| !hit.is_hit()).count();
+            let free = occluded.iter().filter(|occluded| !**occluded).count();
+            assert_eq!((missed, free), (0, 0), "{}", kind.name());
+            hits.push(best);
+        });
+    }
+    assert!(hits.windows(2).all(|pair| pair[0] == pair[1]));
+    compare("sphere", &ball, &prepared[..300]);
+}
+
+#[test]
+fn meshes_without_live_triangles() {
+    let flat = soup(&[[Vec3::ZERO, Vec3::X, Vec3::X * 2.0], [Vec3::splat(f32::NAN); 3]]);
+    let rays: Vec<_> =
+        (0..20).filter_map(|i| PreparedRay::new(&Ray::new(Vec3::ZERO, Random::new(i).vector()))).collect();
+    for empty in [TriangleMesh::default(), flat] {
+        assert_eq!(compare("empty", &empty, &rays), 0);
+    }
+}
+
+#[test]
+fn dropped_triangles_do_not_shift_numbers() {
+    let mut random = Random::new(8);
+    let mut soup = random_soup(&mut random, 60, 0.5);
+    for number in [0, 7, 8, 59] {
+        soup.indices[number][1] = soup.indices[number][0];
+    }
+    let soup = soup.finish().unwrap();
+    assert_eq!(soup.live_count(), 56);
+    compare_on_hard_rays("dropped", &soup, 300);
+}

@@ -1,0 +1,7 @@
+//! What holds for every structure, preset and tree.
+
+mod box_trees;
+mod builds;
+mod compare;
+mod hits;
+mod meshes;
