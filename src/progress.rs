@@ -28,6 +28,34 @@ pub trait Progress: Sync {
     }
 }
 
+/// Some of the current stage's steps, reported piece by piece by work that knows only roughly how far it is.
+pub struct Share<'a> {
+    progress: &'a dyn Progress,
+    steps: u64,
+    reported: u64,
+}
+
+impl<'a> Share<'a> {
+    /// `steps` of the stage, none of them done.
+    pub fn new(progress: &'a dyn Progress, steps: u64) -> Self {
+        Self { progress, steps, reported: 0 }
+    }
+
+    /// Reports that `percent` of the share, at most 100, are done. All steps are reported once 100 is reached.
+    ///
+    /// # Errors
+    /// When the work should stop.
+    pub fn reach(&mut self, percent: u32) -> Result<()> {
+        self.progress.check()?;
+        let reached = (u128::from(self.steps) * u128::from(percent.min(100)) / 100) as u64;
+        if reached > self.reported {
+            self.progress.advance(reached - self.reported);
+            self.reported = reached;
+        }
+        Ok(())
+    }
+}
+
 /// Reports nothing and never stops.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Silent;

@@ -5,7 +5,9 @@ use std::ops::ControlFlow;
 use super::pair_tree::PairTree;
 use super::topology::Topology;
 use super::{Params, TreeStats};
+use crate::error::Result;
 use crate::geometry::{Bounds, PreparedRay};
+use crate::progress::{Progress, Share};
 
 /// A tree over the world boxes of things that it knows by number only.
 pub struct BoxTree {
@@ -15,13 +17,18 @@ pub struct BoxTree {
 }
 
 impl BoxTree {
-    /// Builds a tree over boxes; their positions are their numbers. Empty boxes are left out.
-    pub fn build(boxes: &[Bounds], params: &Params) -> Self {
+    /// Builds a tree over boxes; their positions are their numbers. Empty boxes are left out. Boxes count no steps.
+    ///
+    /// # Errors
+    /// When `progress` says to stop.
+    pub fn build(boxes: &[Bounds], params: &Params, progress: &dyn Progress) -> Result<Self> {
         let live: Vec<u32> = (0..boxes.len() as u32).filter(|&number| !boxes[number as usize].is_empty()).collect();
         let live_boxes: Vec<Bounds> = live.iter().map(|&number| boxes[number as usize]).collect();
-        let topology = Topology::build(&live_boxes, params.preset, 1);
+        let topology = Topology::build(&live_boxes, params.preset, 1, &mut Share::new(progress, 0))?;
         let numbers = topology.order.iter().map(|&at| live[at as usize]).collect();
-        Self { tree: PairTree::new(&topology), numbers }
+        let tree = Self { tree: PairTree::new(&topology), numbers };
+        debug_assert_eq!(tree.validate(boxes), Ok(()), "the tree over boxes");
+        Ok(tree)
     }
 
     /// Calls `visit` with the number of every box that the ray crosses somewhere in `[near, far]`, roughly front to
@@ -61,7 +68,7 @@ impl BoxTree {
     ///
     /// # Errors
     /// A description of the first violation.
-    pub fn validate(&self, boxes: &[Bounds]) -> Result<(), String> {
+    pub fn validate(&self, boxes: &[Bounds]) -> std::result::Result<(), String> {
         let mut numbers = self.numbers.clone();
         numbers.sort_unstable();
         if !numbers.into_iter().eq((0..boxes.len() as u32).filter(|&number| !boxes[number as usize].is_empty())) {

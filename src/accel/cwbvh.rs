@@ -7,19 +7,15 @@
 
 use std::ops::ControlFlow;
 
-use super::leaf::{self, LeafTriangle, TriangleTree, check_distinct, check_partition};
-use super::stack::{Entry, Stack};
+use super::TreeStats;
+use super::leaf::{LeafTriangle, check_partition};
+use super::stack::{self, Entry, Stack};
 use super::topology::{Topology, half_area};
-use super::{Params, TreeStats, TriangleAccelerator};
-use crate::error::Result;
-use crate::geometry::{Bounds, Hit, Key, PreparedRay, TriangleMesh};
-use crate::progress::Progress;
+use super::triangle_tree::TriangleTree;
+use crate::geometry::{Bounds, PreparedRay};
 
 /// Children of a node.
-const WIDTH: usize = 8;
-
-/// The most triangles in a leaf; a child's tag has 2 bits for it.
-const MAX_LEAF: u32 = 4;
+pub(super) const WIDTH: usize = 8;
 
 /// Marks a child's tag as an inner node's.
 const INNER: u8 = 0x80;
@@ -27,7 +23,7 @@ const INNER: u8 = 0x80;
 /// A node. 80 bytes.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(16))]
-struct WideNode {
+pub(super) struct WideNode {
     /// The lower corner of the grid.
     origin: [f32; 3],
     /// Per axis the biased exponent of the grid's step, a power of two.
@@ -59,7 +55,7 @@ fn power_of_two(exponent: u8) -> f32 {
 
 impl WideNode {
     /// A node whose grid covers `bounds`, without children.
-    fn covering(bounds: &Bounds) -> Self {
+    pub(super) fn covering(bounds: &Bounds) -> Self {
         let exponents = std::array::from_fn(|axis| {
             let (min, max) = (bounds.min[axis], bounds.max[axis]);
             // A 255th of the size, rounded down to a power of two, is at most one doubling too small.
@@ -82,7 +78,7 @@ impl WideNode {
     }
 
     /// Adds a child whose box lies within the grid.
-    fn push(&mut self, bounds: &Bounds, tag: u8) {
+    pub(super) fn push(&mut self, bounds: &Bounds, tag: u8) {
         let child = usize::from(self.count);
         for axis in 0..3 {
             let (origin, step) = (self.origin[axis], power_of_two(self.exponents[axis]));
@@ -104,7 +100,7 @@ impl WideNode {
     }
 
     /// A child's box as the traversal sees it.
-    fn bounds(&self, child: usize) -> Bounds {
+    pub(super) fn bounds(&self, child: usize) -> Bounds {
         let corner = |side: usize| {
             let plane = |axis: usize| {
                 restore(self.origin[axis], power_of_two(self.exponents[axis]), self.planes[axis][side][child])
@@ -128,7 +124,7 @@ impl WideNode {
     /// Where the ray enters and leaves the children's boxes, cut to `[near, far]`: [`Bounds::interval`], eight at a
     /// time.
     #[inline(always)]
-    fn intervals(&self, ray: &PreparedRay, near: f32, far: f32) -> [[f32; WIDTH]; 2] {
+    pub(super) fn intervals(&self, ray: &PreparedRay, near: f32, far: f32) -> [[f32; WIDTH]; 2] {
         let (mut near, mut far) = ([near; WIDTH], [far; WIDTH]);
         for axis in 0..3 {
             let (origin, step) = (self.origin[axis], power_of_two(self.exponents[axis]));
@@ -155,9 +151,13 @@ pub struct CwBvh {
     bounds: Bounds,
 }
 
-impl CwBvh {
+impl TriangleTree for CwBvh {
+    const NAME: &'static str = "cwbvh";
+    // A child's tag has 2 bits for it.
+    const MAX_LEAF: u32 = 4;
+
     /// Merges the nodes of a binary tree into wide ones, opening the child with the largest surface first.
-    fn collapse(topology: &Topology, in_order: &[LeafTriangle]) -> Self {
+    fn lay_out(topology: &Topology, in_order: Vec<LeafTriangle>) -> Self {
         let source = &topology.nodes;
         let Some(root) = source.first() else {
             return Self { nodes: Vec::new(), triangles: Vec::new(), bounds: Bounds::EMPTY };
@@ -197,9 +197,11 @@ impl CwBvh {
         }
         Self { nodes, triangles, bounds: root.bounds }
     }
-}
 
-impl TriangleTree for CwBvh {
+    fn triangles(&self) -> &[LeafTriangle] {
+        &self.triangles
+    }
+
     #[inline(always)]
     fn traverse(
         &self,
@@ -211,55 +213,24 @@ impl TriangleTree for CwBvh {
         if self.nodes.is_empty() {
             return ControlFlow::Continue(());
         }
-        let mut far = far;
-        let mut stack = Stack::new();
-        let mut current = Entry { near, first: 0, count: 0 };
-        loop {
-            if current.count == 0 {
-                let node = &self.nodes[current.first as usize];
-                let [entry, exit] = node.intervals(ray, near, far);
-                let mut crossed = 0u32;
-                for child in 0..WIDTH {
-                    crossed |= u32::from(entry[child] <= exit[child]) << child;
-                }
-                crossed &= (1 << node.count) - 1;
-                // Insert each into what this node puts on the stack, the nearest on top.
-                let base = stack.len();
-                while crossed != 0 {
-                    let child = (crossed.trailing_zeros() & 7) as usize;
-                    crossed &= crossed - 1;
-                    stack.insert(base, node.entry(child, entry[child]));
-                }
-            } else {
-                let first = current.first as usize;
-                far = visit(&self.triangles[first..first + current.count as usize])?;
+        let expand = |number: u32, far: f32, stack: &mut Stack| {
+            let node = &self.nodes[number as usize];
+            let [entry, exit] = node.intervals(ray, near, far);
+            let mut crossed = 0u32;
+            for child in 0..WIDTH {
+                crossed |= u32::from(entry[child] <= exit[child]) << child;
             }
-            match stack.pop(far) {
-                Some(entry) => current = entry,
-                None => return ControlFlow::Continue(()),
+            crossed &= (1 << node.count) - 1;
+            // Insert each into what this node puts on the stack, the nearest on top.
+            let base = stack.len();
+            while crossed != 0 {
+                let child = (crossed.trailing_zeros() & 7) as usize;
+                crossed &= crossed - 1;
+                stack.insert(base, node.entry(child, entry[child]));
             }
-        }
-    }
-}
-
-impl TriangleAccelerator for CwBvh {
-    const NAME: &'static str = "cwbvh";
-
-    fn build(mesh: &TriangleMesh, params: &Params, progress: &dyn Progress) -> Result<Self> {
-        let (topology, triangles) = leaf::build_topology(mesh, params, MAX_LEAF, progress)?;
-        Ok(Self::collapse(&topology, &triangles))
-    }
-
-    fn closest(&self, ray: &PreparedRay, instance: u32, best: &mut Hit) {
-        leaf::closest(self, ray, instance, best);
-    }
-
-    fn occluded(&self, ray: &PreparedRay) -> bool {
-        leaf::occluded(self, ray)
-    }
-
-    fn next_after(&self, ray: &PreparedRay, instance: u32, key: Key, best: &mut Hit) {
-        leaf::next_after(self, ray, instance, key, best);
+            None
+        };
+        stack::traverse(far, expand, |range| visit(&self.triangles[range]))
     }
 
     fn stats(&self) -> TreeStats {
@@ -290,8 +261,7 @@ impl TriangleAccelerator for CwBvh {
         stats
     }
 
-    fn validate(&self) -> std::result::Result<(), String> {
-        check_distinct(&self.triangles)?;
+    fn validate_nodes(&self) -> Result<(), String> {
         // From the leaves up: the exact box of each node, which its parent's quantised one must contain. Children come
         // after their parents.
         let mut exact = vec![Bounds::EMPTY; self.nodes.len()];

@@ -4,7 +4,7 @@ use super::leaf::{LeafTriangle, check_distinct};
 use super::{Params, TreeStats, TriangleAccelerator};
 use crate::error::Result;
 use crate::geometry::{Bounds, Hit, Key, PreparedRay, TriangleMesh};
-use crate::progress::Progress;
+use crate::progress::{Progress, Share};
 
 /// No tree: all live triangles in the order of the mesh. Culls nothing, so that it cannot cull wrongly.
 pub struct Linear {
@@ -16,8 +16,9 @@ impl TriangleAccelerator for Linear {
     const NAME: &'static str = "linear";
 
     fn build(mesh: &TriangleMesh, _params: &Params, progress: &dyn Progress) -> Result<Self> {
-        progress.check()?;
+        let mut share = Share::new(progress, mesh.live_count() as u64);
         let triangles: Vec<_> = mesh.live_triangles().map(|number| LeafTriangle::new(mesh, number)).collect();
+        share.reach(100)?;
         Ok(Self { triangles, bounds: mesh.bounds() })
     }
 

@@ -26,6 +26,7 @@ mod stats;
 #[cfg(test)]
 mod tests;
 mod topology;
+mod triangle_tree;
 
 pub use box_tree::BoxTree;
 pub use bvh2::Bvh2;
@@ -153,7 +154,8 @@ pub trait TriangleAccelerator: Sized + Send + Sync {
     /// What the structure is called on the command line and in reports.
     const NAME: &'static str;
 
-    /// Builds the structure over the mesh's live triangles. The mesh is not needed afterwards.
+    /// Builds the structure over the mesh's live triangles, each of which is a step of `progress`. The mesh is not needed
+    /// afterwards.
     ///
     /// # Errors
     /// When `progress` says to stop.

@@ -2,7 +2,7 @@
 
 use std::ops::{ControlFlow, Range};
 
-use super::stack::{Entry, Stack};
+use super::stack::{self, Entry, Stack};
 use super::stats::TreeStats;
 use super::topology::{Node, Topology, half_area};
 use crate::geometry::{Bounds, PreparedRay};
@@ -10,7 +10,7 @@ use crate::geometry::{Bounds, PreparedRay};
 /// A node: the boxes of two children and where to find them. 64 bytes.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(64))]
-struct Pair {
+pub(super) struct Pair {
     /// `planes[axis][side][child]`: side 0 is the lower plane.
     planes: [[[f32; 2]; 2]; 3],
     /// Per child its node number, or the first item of the leaf.
@@ -20,7 +20,7 @@ struct Pair {
 }
 
 impl Pair {
-    fn new(children: [Node; 2]) -> Self {
+    pub(super) fn new(children: [Node; 2]) -> Self {
         let [a, b] = children.map(|child| child.bounds);
         let planes = std::array::from_fn(|axis| [[a.min[axis], b.min[axis]], [a.max[axis], b.max[axis]]]);
         Self { planes, first: children.map(|child| child.first), count: children.map(|child| child.count) }
@@ -33,7 +33,7 @@ impl Pair {
 
     /// Where the ray enters and leaves the two boxes, cut to `[near, far]`: [`Bounds::interval`], two at a time.
     #[inline(always)]
-    fn intervals(&self, ray: &PreparedRay, near: f32, far: f32) -> [[f32; 2]; 2] {
+    pub(super) fn intervals(&self, ray: &PreparedRay, near: f32, far: f32) -> [[f32; 2]; 2] {
         let (mut near, mut far) = ([near; 2], [far; 2]);
         for axis in 0..3 {
             let [lower, upper] = self.planes[axis];
@@ -87,52 +87,32 @@ impl PairTree {
         self.bounds
     }
 
-    /// Visits every leaf whose box the ray crosses somewhere in `[near, far]`, the nearer child of a node first.
-    ///
-    /// `visit` gets the positions of the leaf's items; it returns the new `far`, no larger than before, or breaks off
-    /// the whole traversal. A box that is entered exactly at `far` is visited: what it holds may tie.
+    /// Visits every leaf whose box the ray crosses somewhere in `[near, far]`, the nearer child of a node first; for
+    /// `visit` see [`stack::traverse`].
     #[inline(always)]
     pub fn traverse(
         &self,
         ray: &PreparedRay,
         near: f32,
         far: f32,
-        mut visit: impl FnMut(Range<usize>) -> ControlFlow<(), f32>,
+        visit: impl FnMut(Range<usize>) -> ControlFlow<(), f32>,
     ) -> ControlFlow<()> {
-        let mut far = far;
-        let mut stack = Stack::new();
-        let mut current = Entry { near, first: 0, count: 0 };
-        loop {
-            if current.count == 0 {
-                let node = &self.nodes[current.first as usize];
-                let [entry, exit] = node.intervals(ray, near, far);
-                let child = |i: usize| Entry { near: entry[i], first: node.first[i], count: node.count[i] };
-                match (entry[0] <= exit[0], entry[1] <= exit[1]) {
-                    (true, true) => {
-                        let nearer = usize::from(entry[1] < entry[0]);
-                        stack.push(child(1 - nearer));
-                        current = child(nearer);
-                        continue;
-                    }
-                    (true, false) => {
-                        current = child(0);
-                        continue;
-                    }
-                    (false, true) => {
-                        current = child(1);
-                        continue;
-                    }
-                    (false, false) => {}
+        let expand = |number: u32, far: f32, stack: &mut Stack| {
+            let node = &self.nodes[number as usize];
+            let [entry, exit] = node.intervals(ray, near, far);
+            let child = |i: usize| Entry { near: entry[i], first: node.first[i], count: node.count[i] };
+            match (entry[0] <= exit[0], entry[1] <= exit[1]) {
+                (true, true) => {
+                    let nearer = usize::from(entry[1] < entry[0]);
+                    stack.push(child(1 - nearer));
+                    Some(child(nearer))
                 }
-            } else {
-                let first = current.first as usize;
-                far = visit(first..first + current.count as usize)?;
+                (true, false) => Some(child(0)),
+                (false, true) => Some(child(1)),
+                (false, false) => None,
             }
-            match stack.pop(far) {
-                Some(entry) => current = entry,
-                None => return ControlFlow::Continue(()),
-            }
-        }
+        };
+        stack::traverse(far, expand, visit)
     }
 
     /// Every leaf as (box, first, count), in no particular order.

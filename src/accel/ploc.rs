@@ -6,7 +6,9 @@
 //! to the exact boxes, so the builder may be shown slightly different ones: each is moved by a pseudo-random thousandth
 //! of its size, which breaks ties, and they are dealt out in 64 passes, so that runs along the curve are short.
 
-use glam::DVec3;
+use std::ops::Range;
+
+use glam::{DVec3, Vec3};
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
@@ -16,8 +18,10 @@ use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::ploc::PlocBuilder;
 
 use super::Preset;
+use crate::error::Result;
 use crate::geometry::Bounds;
 use crate::math::random::{hash2, unit};
+use crate::progress::Share;
 
 /// How far boxes are moved, in parts of their size: enough to break ties, too little to matter to the tree.
 const NUDGE: f64 = 1.0 / 1024.0;
@@ -28,22 +32,25 @@ const NUDGE_ULP: f64 = 4.0 * f32::EPSILON as f64;
 /// In how many passes boxes are dealt out.
 const PASSES: usize = 64;
 
-/// Trees deeper than this are not optimised further.
+/// Trees deeper than this are not optimised further: every node's search goes up to the root.
 const OPTIMIZED_DEPTH: usize = 100;
 
-/// By how much the optimiser may deepen a tree before the depth is looked at again: it sizes its stack by the depth that
-/// it is told, and panics beyond. Nested boxes were seen to become 5 times as deep in one round.
-const DEEPENING: usize = 20;
+/// The depth that the optimiser is told. It sizes its stack by twice of this and searches on an array up to here, which
+/// forgets places when it is full; beyond, it allocates exactly what it is told and panics where the tree is deeper.
+/// What the trees above need fits, and a tree that became deeper on the way is merely optimised less.
+const SEARCH_DEPTH: usize = 96;
 
-/// The optimiser's rounds, each on a part of the nodes that is 1 over the number (obvhs's own choice), in groups after
-/// which the depth is looked at: often while the rounds are large.
-const OPTIMIZER_ROUNDS: [&[f32]; 5] =
-    [&[1.0], &[3.0], &[5.0, 7.0], &[9.0, 11.0, 13.0, 15.0], &[17.0, 19.0, 21.0, 23.0, 25.0, 27.0, 29.0, 31.0]];
+/// The optimiser's rounds; round `i` tries a part of the nodes that is 1 over `2 i + 1` (obvhs's own choice).
+const OPTIMIZER_ROUNDS: u32 = 16;
 
 /// Builds nodes over boxes that are not empty, and the boxes' positions in the order of the leaves.
 ///
-/// The boxes in the nodes are approximate.
-pub fn build(boxes: &[Bounds], preset: Preset, max_leaf: u32) -> (Vec<Bvh2Node>, Vec<u32>) {
+/// The boxes in the nodes are approximate. Reports up to 95 % of `share`; how the stages divide it is a guess, and the
+/// merging is one stage that cannot be stopped.
+///
+/// # Errors
+/// When `share` says to stop.
+pub fn build(boxes: &[Bounds], preset: Preset, max_leaf: u32, share: &mut Share) -> Result<(Vec<Bvh2Node>, Vec<u32>)> {
     let params = match preset {
         Preset::Fast => BvhBuildParams::fast_build(),
         Preset::Balanced => BvhBuildParams::medium_build(),
@@ -51,6 +58,7 @@ pub fn build(boxes: &[Bounds], preset: Preset, max_leaf: u32) -> (Vec<Bvh2Node>,
     };
     let dealt = deal(boxes.len());
     let nudged = nudge(boxes, &dealt);
+    share.reach(5)?;
     let mut tree = PlocBuilder::with_capacity(nudged.len()).build(
         params.ploc_search_distance,
         &nudged,
@@ -59,24 +67,37 @@ pub fn build(boxes: &[Bounds], preset: Preset, max_leaf: u32) -> (Vec<Bvh2Node>,
         params.search_depth_threshold,
     );
     drop(nudged);
+    share.reach(35)?;
 
-    let mut optimizer = ReinsertionOptimizer::default();
-    let mut optimize = |tree: &mut Bvh2, ratio: f32| {
-        for rounds in OPTIMIZER_ROUNDS {
-            let depth = depth(&tree.nodes);
-            if depth > OPTIMIZED_DEPTH {
-                return;
-            }
-            tree.max_depth = DEEPENING * depth;
-            optimizer.run(tree, ratio, Some(rounds.iter().map(|round| 1.0 / round).collect()));
-        }
-    };
-    optimize(&mut tree, params.reinsertion_batch_ratio);
+    let ratio = params.reinsertion_batch_ratio;
+    optimize(&mut tree, ratio, 35..60, share)?;
     collapse(&mut tree, max_leaf, params.collapse_traversal_cost);
-    optimize(&mut tree, params.reinsertion_batch_ratio * params.post_collapse_reinsertion_batch_ratio_multiplier);
+    share.reach(65)?;
+    optimize(&mut tree, ratio * params.post_collapse_reinsertion_batch_ratio_multiplier, 65..95, share)?;
 
     let order = tree.primitive_indices.iter().map(|&position| dealt[position as usize]).collect();
-    (tree.nodes, order)
+    Ok((tree.nodes, order))
+}
+
+/// Moves nodes to better places, `ratio` of them in the first round, and reports `percent` of `share` on the way.
+fn optimize(tree: &mut Bvh2, ratio: f32, percent: Range<u32>, share: &mut Share) -> Result<()> {
+    let mut optimizer = ReinsertionOptimizer::default();
+    for round in 0..OPTIMIZER_ROUNDS {
+        // Nested boxes were seen to become 5 times as deep in the first round, which is the largest: look at the depth
+        // often while rounds are large.
+        if (round == 0 || round.is_power_of_two()) && depth(&tree.nodes) > OPTIMIZED_DEPTH {
+            break;
+        }
+        optimize_round(&mut optimizer, tree, ratio, round);
+        share.reach(percent.start + (percent.end - percent.start) * (round + 1) / OPTIMIZER_ROUNDS)?;
+    }
+    Ok(())
+}
+
+/// One round of the optimiser, which may be given a tree of any depth.
+fn optimize_round(optimizer: &mut ReinsertionOptimizer, tree: &mut Bvh2, ratio: f32, round: u32) {
+    tree.max_depth = SEARCH_DEPTH;
+    optimizer.run(tree, ratio, Some(vec![1.0 / (2 * round + 1) as f32]));
 }
 
 /// The numbers below `count`, every 64th part in turn.
@@ -86,13 +107,16 @@ fn deal(count: usize) -> Vec<u32> {
 }
 
 /// The boxes in the given order, scaled by a power of two so that areas neither overflow nor vanish, and moved a little.
+/// Boxes without end are cut off where f32 ends.
 fn nudge(boxes: &[Bounds], order: &[u32]) -> Vec<Aabb> {
+    let largest_f32 = DVec3::splat(f64::from(f32::MAX));
+    let finite = |corner: Vec3| corner.as_dvec3().clamp(-largest_f32, largest_f32);
     let total = boxes.iter().fold(Bounds::EMPTY, |total, &bounds| total.union(bounds));
-    let largest = total.size().max_element();
+    let largest = (finite(total.max) - finite(total.min)).max_element();
     let scale = if largest > 0.0 { libm::exp2(-libm::floor(libm::log2(largest))) } else { 1.0 };
     let nudged = |&number: &u32| {
         let bounds = &boxes[number as usize];
-        let (min, max) = (bounds.min.as_dvec3() * scale, bounds.max.as_dvec3() * scale);
+        let (min, max) = (finite(bounds.min) * scale, finite(bounds.max) * scale);
         let reach = (max - min).max_element() * NUDGE + min.abs().max(max.abs()) * NUDGE_ULP;
         let random = |axis| 2.0 * unit(hash2(number, axis)) - 1.0;
         let shift = DVec3::new(random(0), random(1), random(2)) * reach;
@@ -115,4 +139,53 @@ fn depth(nodes: &[Bvh2Node]) -> usize {
         }
     }
     deepest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A chain of boxes within boxes, the smallest of all on top: its search for a better place goes down all the way.
+    fn chain(leaves: usize) -> Bvh2 {
+        let around = |item: usize| {
+            let size = if item == 0 { 0.5 } else { (leaves - item) as f32 };
+            Aabb::new(glam::Vec3A::splat(-size), glam::Vec3A::splat(size))
+        };
+        let mut nodes = vec![Bvh2Node::new(around(1), 0, 1)];
+        for item in 0..leaves - 1 {
+            nodes.push(Bvh2Node::new(around(item), 1, item as u32));
+            let below = nodes.len() as u32 + 1;
+            let (count, first) = if item + 2 < leaves { (0, below) } else { (1, item as u32 + 1) };
+            nodes.push(Bvh2Node::new(around(item + 1), count, first));
+        }
+        Bvh2 { nodes, primitive_indices: (0..leaves as u32).collect(), ..Bvh2::default() }
+    }
+
+    /// The items in the leaves that are reached from the root, sorted.
+    fn items(tree: &Bvh2) -> Vec<u32> {
+        let mut items = Vec::new();
+        let mut pending = vec![0];
+        while let Some(number) = pending.pop() {
+            let node = &tree.nodes[number as usize];
+            if node.is_leaf() {
+                items.extend(&tree.primitive_indices[node.first_index as usize..][..node.prim_count as usize]);
+            } else {
+                pending.extend([node.first_index, node.first_index + 1]);
+            }
+        }
+        items.sort_unstable();
+        items
+    }
+
+    #[test]
+    fn the_optimizer_survives_trees_far_deeper_than_it_is_told() {
+        const LEAVES: usize = 3000;
+        let mut tree = chain(LEAVES);
+        assert_eq!(depth(&tree.nodes), LEAVES - 1);
+        let mut optimizer = ReinsertionOptimizer::default();
+        for round in 0..4 {
+            optimize_round(&mut optimizer, &mut tree, 1.0, round);
+            assert!(items(&tree).into_iter().eq(0..LEAVES as u32), "round {round}");
+        }
+    }
 }

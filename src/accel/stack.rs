@@ -1,4 +1,6 @@
-//! The stack of a traversal: never overflows, and costs little to start.
+//! The traversal that all trees share, and its stack: never overflows, and costs little to start.
+
+use std::ops::{ControlFlow, Range};
 
 /// Part of a tree that is yet to be visited.
 #[derive(Debug, Clone, Copy)]
@@ -87,6 +89,36 @@ impl Stack {
     #[inline(never)]
     fn unspill(&mut self) -> Option<Entry> {
         self.spilled.pop()
+    }
+}
+
+/// Walks a tree from node 0, roughly front to back, as far as its boxes are entered no later than `far`.
+///
+/// `expand(node, far, stack)` puts those children of a node on the stack that the ray crosses up to `far`, and may hold
+/// one back to return it: that one is next. `visit` gets the positions of a leaf's items; it returns the new `far`, no
+/// larger than before, or breaks off the whole traversal. A box that is entered exactly at `far` is visited: what it
+/// holds may tie.
+#[inline(always)]
+pub fn traverse(
+    far: f32,
+    mut expand: impl FnMut(u32, f32, &mut Stack) -> Option<Entry>,
+    mut visit: impl FnMut(Range<usize>) -> ControlFlow<(), f32>,
+) -> ControlFlow<()> {
+    let mut far = far;
+    let mut stack = Stack::new();
+    let mut current = Entry { near: f32::NEG_INFINITY, first: 0, count: 0 };
+    loop {
+        let next = if current.count == 0 {
+            expand(current.first, far, &mut stack)
+        } else {
+            let first = current.first as usize;
+            far = visit(first..first + current.count as usize)?;
+            None
+        };
+        match next.or_else(|| stack.pop(far)) {
+            Some(entry) => current = entry,
+            None => return ControlFlow::Continue(()),
+        }
     }
 }
 

@@ -2,7 +2,9 @@
 
 use super::Preset;
 use super::ploc;
+use crate::error::Result;
 use crate::geometry::Bounds;
+use crate::progress::Share;
 
 /// A node: a leaf with items, or two children.
 #[derive(Debug, Clone, Copy)]
@@ -33,10 +35,16 @@ pub struct Topology {
 }
 
 impl Topology {
-    /// Builds a tree over boxes that are not empty, with at most `max_leaf` of them a leaf.
-    pub fn build(boxes: &[Bounds], preset: Preset, max_leaf: u32) -> Self {
-        let (source, source_order) = ploc::build(boxes, preset, max_leaf);
-        let Some(_) = source.first() else { return Self::default() };
+    /// Builds a tree over boxes that are not empty, with at most `max_leaf` of them a leaf. Reports all but the end of
+    /// `share`, which is for the layout made from it.
+    ///
+    /// # Errors
+    /// When `share` says to stop.
+    pub fn build(boxes: &[Bounds], preset: Preset, max_leaf: u32, share: &mut Share) -> Result<Self> {
+        let (source, source_order) = ploc::build(boxes, preset, max_leaf, share)?;
+        if source.is_empty() {
+            return Ok(Self::default());
+        }
 
         // Copy the tree depth first: a subtree's nodes and leaf items end up side by side.
         let unset = Node { bounds: Bounds::EMPTY, first: 0, count: 0 };
@@ -69,7 +77,7 @@ impl Topology {
                 nodes[first].bounds.union(nodes[first + 1].bounds)
             };
         }
-        Self { nodes, order }
+        Ok(Self { nodes, order })
     }
 }
 

@@ -101,18 +101,14 @@ impl Filter for Transmissive {
 }
 
 impl<A: TriangleAccelerator> TwoLevel<A> {
-    /// Builds the trees of all meshes and the top level.
+    /// Builds the trees of all meshes and the top level. Advances by one step a live triangle.
     ///
     /// # Errors
     /// A singular transform, or a cancellation.
     pub fn build(scene: &Scene, params: &Params, progress: &dyn Progress) -> Result<Self> {
         let world = World::new(scene)?;
         let instances = &world.instances;
-        let mut meshes = Vec::with_capacity(scene.meshes.len());
-        for mesh in &scene.meshes {
-            meshes.push(A::build(mesh, params, progress)?);
-            progress.advance(mesh.live_count() as u64);
-        }
+        let meshes = scene.meshes.iter().map(|mesh| A::build(mesh, params, progress)).collect::<Result<Vec<_>>>()?;
         let single = matches!(instances.as_slice(), [one] if one.identity && one.shape == Shape::Mesh(0));
         let top = if single {
             Top::Single
@@ -120,7 +116,7 @@ impl<A: TriangleAccelerator> TwoLevel<A> {
             Top::Linear
         } else {
             let unbounded = (0..instances.len() as u32).filter(|&i| instances[i as usize].bounds.is_none()).collect();
-            Top::Tree { tree: BoxTree::build(&boxes(instances), params), unbounded }
+            Top::Tree { tree: BoxTree::build(&boxes(instances), params, progress)?, unbounded }
         };
         Ok(Self { meshes, quadrics: scene.quadrics.clone(), world, top })
     }

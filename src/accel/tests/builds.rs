@@ -1,5 +1,6 @@
 //! Builds end, in time and when told to, and describe themselves.
 
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use glam::Vec3;
@@ -51,16 +52,52 @@ fn coincident_and_regular_triangles_build_quickly() {
     }
 }
 
-#[test]
-fn cancelled_builds_stop() {
-    struct Cancelled;
-    impl Progress for Cancelled {
-        fn is_cancelled(&self) -> bool {
-            true
-        }
+/// Counts steps and looks for cancellation, and cancels at the `stop`-th look.
+struct Counted {
+    steps: AtomicU64,
+    reports: AtomicU64,
+    looks: AtomicU64,
+    stop: u64,
+}
+
+impl Counted {
+    fn new(stop: u64) -> Self {
+        Self { steps: AtomicU64::new(0), reports: AtomicU64::new(0), looks: AtomicU64::new(0), stop }
     }
+}
+
+impl Progress for Counted {
+    fn advance(&self, steps: u64) {
+        self.steps.fetch_add(steps, Ordering::Relaxed);
+        self.reports.fetch_add(1, Ordering::Relaxed);
+    }
+
+    fn is_cancelled(&self) -> bool {
+        self.looks.fetch_add(1, Ordering::Relaxed) + 1 >= self.stop
+    }
+}
+
+#[test]
+fn builds_report_every_triangle_once_and_stop_wherever_they_look() {
+    let ball = sphere(20, 20);
     for &kind in Kind::ALL {
-        dispatch_kind!(kind, A => assert!(A::build(&sphere(4, 4), &Params::default(), &Cancelled).is_err()));
+        for &preset in Preset::ALL {
+            let params = Params { preset, ..Params::default() };
+            dispatch_kind!(kind, A => {
+                let whole = Counted::new(u64::MAX);
+                A::build(&ball, &params, &whole).unwrap();
+                assert_eq!(whole.steps.into_inner(), ball.live_count() as u64, "{} {preset:?}", A::NAME);
+                let (looks, reports) = (whole.looks.into_inner(), whole.reports.into_inner());
+                if kind != Kind::Linear {
+                    assert!(looks > 30 && reports > 10, "{} {preset:?}: {looks} looks, {reports} reports", A::NAME);
+                }
+                for stop in 1..=looks {
+                    let stopped = Counted::new(stop);
+                    assert!(A::build(&ball, &params, &stopped).is_err(), "{} {preset:?} {stop}", A::NAME);
+                    assert_eq!(stopped.looks.into_inner(), stop, "work goes on after a cancellation");
+                }
+            });
+        }
     }
 }
 
