@@ -4,4 +4,5 @@ mod box_trees;
 mod builds;
 mod compare;
 mod hits;
+mod intervals;
 mod meshes;
