@@ -6,6 +6,7 @@ mod command_line;
 mod common;
 mod far_from_origin;
 mod golden;
+mod instances;
 mod models;
 mod shading;
 mod spawned_rays;
