@@ -30,13 +30,13 @@ pub fn choose(scene: &mut Scene, automatic: Automatic, arguments: &CameraArgumen
     } else if automatic.camera {
         if resized || arguments.fov.is_some() {
             scene.cameras[scene.active_camera].camera =
-                auto::default_camera(scene, arguments.fov.unwrap_or(default_fov()));
+                automatic.default_camera(scene, arguments.fov.unwrap_or(default_fov()));
         }
     } else if let Some(fov) = arguments.fov {
         set_field_of_view(&mut scene.cameras[scene.active_camera], fov)?;
     }
     if automatic.lights {
-        auto::light_from_camera(scene);
+        automatic.light_from_camera(scene);
     }
     Ok(())
 }
@@ -81,7 +81,7 @@ mod tests {
         }
     }
 
-    const NOTHING: Automatic = Automatic { camera: false, lights: false };
+    const NOTHING: Automatic = Automatic { camera: false, lights: false, room: None };
 
     fn asked(scene: &mut Scene, arguments: CameraArguments) -> Result<()> {
         choose(scene, NOTHING, &arguments, false)

@@ -3,8 +3,9 @@
 use glam::DVec3;
 
 use crate::math::vector::{cross, dot, normalize};
+use crate::scene::outline;
 use crate::scene::room::Room;
-use crate::scene::{Background, Camera, Light, LightKind, NamedCamera, Projection, Rgb, Scene, Shape};
+use crate::scene::{Background, Camera, Light, LightKind, NamedCamera, Projection, Rgb, Scene};
 
 /// A named direction to look from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,12 +58,35 @@ const MARGIN: f64 = 0.06;
 pub const CAMERA_NAME: &str = "auto";
 
 /// What of a scene was chosen automatically, and so is chosen again for another view of it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Automatic {
     /// The only camera.
     pub camera: bool,
     /// The lights.
     pub lights: bool,
+    /// The room that the scene is, which camera and lights are chosen for; looked for where one of them is automatic.
+    pub room: Option<Room>,
+}
+
+impl Automatic {
+    /// A camera that frames the scene from a little to the right and above, or looks straight into a room that is open
+    /// on one side, for the film's current size; `fov_y` in radians.
+    pub fn default_camera(&self, scene: &Scene, fov_y: f64) -> Camera {
+        let (azimuth, elevation) = match &self.room {
+            Some(room) => (room.azimuth, 0.0),
+            None => (DEFAULT_ANGLES.0.to_radians(), DEFAULT_ANGLES.1.to_radians()),
+        };
+        frame(scene, azimuth, elevation, fov_y)
+    }
+
+    /// Replaces the lights by a key, a fill and a rim light for the active camera; in a room that is open on one side,
+    /// by a lamp under the ceiling and a fill light at the camera.
+    pub fn light_from_camera(&self, scene: &mut Scene) {
+        scene.lights = match &self.room {
+            Some(room) => room.lights(scene.camera()),
+            None => studio_lights(scene.camera()),
+        };
+    }
 }
 
 /// Gives a scene that came from a bare model what it lacks: a camera that frames it, lights, a background.
@@ -71,46 +95,35 @@ pub fn complete(scene: &mut Scene) -> Automatic {
     let level = libm::exp2f(-scene.film.exposure);
     let (bottom, top) = (Rgb::splat(0.32) * level, Rgb::new(0.80, 0.84, 0.90) * level);
     scene.background = Background::Gradient { bottom, top, up: DVec3::Y };
-    let automatic = Automatic { camera: complete_camera(scene), lights: scene.lights.is_empty() };
-    if automatic.lights {
-        light_from_camera(scene);
-    }
-    automatic
+    let lights = scene.lights.is_empty();
+    add_missing(scene, lights)
 }
 
-/// Gives a scene without a camera one that frames it; whether it did.
-pub fn complete_camera(scene: &mut Scene) -> bool {
-    let missing = scene.cameras.is_empty();
-    if missing {
-        let camera = default_camera(scene, DEFAULT_FOV.to_radians());
+/// Gives a scene without a camera one that frames it.
+pub fn complete_camera(scene: &mut Scene) -> Automatic {
+    add_missing(scene, false)
+}
+
+/// Adds a camera if there is none, and lights if `lights` says so.
+fn add_missing(scene: &mut Scene, lights: bool) -> Automatic {
+    let camera = scene.cameras.is_empty();
+    let room = if camera || lights { Room::of(scene) } else { None };
+    let automatic = Automatic { camera, lights, room };
+    if camera {
+        let camera = automatic.default_camera(scene, DEFAULT_FOV.to_radians());
         scene.cameras.push(NamedCamera { name: CAMERA_NAME.into(), camera });
     }
-    missing
-}
-
-/// A camera that frames the scene from a little to the right and above, or looks straight into a room that is open on
-/// one side, for the film's current size; `fov_y` in radians.
-pub fn default_camera(scene: &Scene, fov_y: f64) -> Camera {
-    let (azimuth, elevation) = match Room::of(scene) {
-        Some(room) => (room.azimuth, 0.0),
-        None => (DEFAULT_ANGLES.0.to_radians(), DEFAULT_ANGLES.1.to_radians()),
-    };
-    frame(scene, azimuth, elevation, fov_y)
-}
-
-/// Replaces the lights by a key, a fill and a rim light for the active camera; in a room that is open on one side, by a
-/// lamp under the ceiling and a fill light at the camera.
-pub fn light_from_camera(scene: &mut Scene) {
-    scene.lights = match Room::of(scene) {
-        Some(room) => room.lights(scene.camera()),
-        None => studio_lights(scene.camera()),
-    };
+    if lights {
+        automatic.light_from_camera(scene);
+    }
+    automatic
 }
 
 /// A camera that sees the whole scene from a direction and fills the picture with it.
 ///
 /// Angles in radians: azimuth 0 looks from +Z and grows towards +X, elevation grows towards +Y; `fov_y` is vertical.
-/// The four sides of the picture each touch the model's vertices, up to a margin, for the film's current size.
+/// For the film's current size, two opposite sides of the picture touch the model's vertices, up to a margin, and the
+/// other two have room left. Where there are very many instances, the corners of their boxes stand for vertices.
 pub fn frame(scene: &Scene, azimuth: f64, elevation: f64, fov_y: f64) -> Camera {
     let (sin_a, cos_a) = libm::sincos(azimuth);
     let (sin_e, cos_e) = libm::sincos(elevation);
@@ -128,65 +141,30 @@ pub fn frame(scene: &Scene, azimuth: f64, elevation: f64, fov_y: f64) -> Camera 
     // sides bounds a linear function of the eye; the nearest eye that satisfies all has this closed form.
     let mut sides = [f64::NEG_INFINITY; 4];
     let mut nearest = f64::NEG_INFINITY;
-    let points = outline(scene);
-    for &p in &points {
+    let (mut depths, mut count) = (0.0, 0u64);
+    outline::visit(scene, |p| {
         let (x, y, z) = (dot(p, right), dot(p, up), dot(p, backward));
         let limits = [x + slope_x * z, -x + slope_x * z, y + slope_y * z, -y + slope_y * z];
         for (side, limit) in sides.iter_mut().zip(limits) {
             *side = side.max(limit);
         }
         nearest = nearest.max(z);
-    }
-    if points.is_empty() {
+        depths += z;
+        count += 1;
+    });
+    if count == 0 {
         sides = [slope_x, slope_x, slope_y, slope_y];
         nearest = 0.0;
     }
+    let center = if count == 0 { 0.0 } else { depths / count as f64 };
     let [right_side, left_side, top_side, bottom_side] = sides;
     let (x, y) = (0.5 * (right_side - left_side), 0.5 * (top_side - bottom_side));
     let z = (0.5 * (right_side + left_side) / slope_x).max(0.5 * (top_side + bottom_side) / slope_y);
     // A point-like model leaves no distance at all; stand one unit away.
     let z = if z > nearest { z } else { nearest + 1.0 };
     let eye = right * x + up * y + backward * z;
-    let target = eye - backward * (z - 0.5 * (nearest + depth_of_center(&points, backward, nearest)));
+    let target = eye - backward * (z - 0.5 * (nearest + center));
     Camera::LookAt { eye, target, up, projection: Projection::Perspective { fov_y } }
-}
-
-/// The mean depth of the points along `backward`.
-fn depth_of_center(points: &[DVec3], backward: DVec3, fallback: f64) -> f64 {
-    if points.is_empty() {
-        return fallback;
-    }
-    points.iter().map(|&p| dot(p, backward)).sum::<f64>() / points.len() as f64
-}
-
-/// Points in the file's coordinates whose hull is that of the scene, or nearly: mesh vertices, every n-th of very large
-/// scenes, and the corners of the boxes of bounded quadrics.
-pub(super) fn outline(scene: &Scene) -> Vec<DVec3> {
-    const MOST_POINTS: usize = 2_000_000;
-    let vertices = |shape: Shape| match shape {
-        Shape::Mesh(mesh) => scene.meshes[mesh as usize].live_count() * 3,
-        Shape::Quadric(_) => 8,
-    };
-    let total: usize = scene.objects.iter().map(|object| vertices(object.shape)).sum();
-    let stride = total.div_ceil(MOST_POINTS).max(1);
-    let mut points = Vec::new();
-    for object in &scene.objects {
-        match object.shape {
-            Shape::Mesh(mesh) => {
-                let mesh = &scene.meshes[mesh as usize];
-                let corners = mesh.live_triangles().flat_map(|number| mesh.triangle(number));
-                let place = |p: glam::Vec3| object.transform.transform_point3(mesh.origin + p.as_dvec3());
-                points.extend(corners.step_by(stride).map(place));
-            }
-            Shape::Quadric(quadric) => {
-                if let Some(bounds) = scene.quadrics[quadric as usize].bounds() {
-                    let corners = bounds.corners();
-                    points.extend(corners.iter().map(|p| object.transform.transform_point3(p.as_dvec3())));
-                }
-            }
-        }
-    }
-    points
 }
 
 /// Key, fill and rim light, fixed to the camera: from the upper left, the right and behind.
@@ -214,7 +192,7 @@ fn studio_lights(camera: &Camera) -> Vec<Light> {
 mod tests {
     use super::*;
     use crate::geometry::TriangleMesh;
-    use crate::scene::Object;
+    use crate::scene::{Object, Shape};
     use glam::{DAffine3, Vec3};
 
     fn cube() -> Scene {
@@ -241,7 +219,7 @@ mod tests {
             let up = cross(right, forward);
             let half = (0.3f64).tan();
             let mut extent = 0.0f64;
-            for p in outline(&scene) {
+            for p in outline::sample(&scene) {
                 let d = p - eye;
                 let z = dot(d, forward);
                 assert!(z > 0.0);
@@ -250,6 +228,22 @@ mod tests {
             }
             assert!((extent - (1.0 - 2.0 * MARGIN)).abs() < 1e-9, "{azimuth} {elevation}: {extent}");
         }
+    }
+
+    #[test]
+    fn a_single_tip_of_a_large_model_is_in_the_picture() {
+        let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::new(9.0, 9.0, 1.0)];
+        let eye = |base: usize| {
+            let mut indices = vec![[0, 1, 2]; base];
+            // Neither the first nor the last corner.
+            indices.insert(base / 2, [0, 3, 1]);
+            let mesh = TriangleMesh { positions: positions.clone(), indices, ..Default::default() };
+            let object = Object { shape: Shape::Mesh(0), ..cube().objects[0].clone() };
+            let scene = Scene { meshes: vec![mesh.finish().unwrap()], objects: vec![object], ..Default::default() };
+            let Camera::LookAt { eye, .. } = frame(&scene, 0.5, 0.3, 0.6) else { panic!() };
+            eye
+        };
+        assert_eq!(eye(1_500_000), eye(1));
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::math::vector::{dot, normalize};
-use crate::scene::auto::outline;
+use crate::scene::outline;
 use crate::scene::{Falloff, Light, LightKind, Rgb, Scene};
 
 /// How bright the lights together shall make a surface that faces them: a little less than the studio lights of a bare
@@ -17,7 +17,8 @@ const TARGET: f64 = 1.0;
 /// dark behind a spot. Shadows and the surface's direction are left out.
 pub fn automatic(scene: &Scene) -> f32 {
     let received = |p: DVec3| scene.lights.iter().map(|light| irradiance(light, p)).sum::<f64>();
-    let mut values: Vec<f64> = outline(scene).into_iter().map(received).filter(|&e| e > 0.0 && e.is_finite()).collect();
+    let mut values: Vec<f64> =
+        outline::sample(scene).into_iter().map(received).filter(|&e| e > 0.0 && e.is_finite()).collect();
     if values.is_empty() {
         return 0.0;
     }

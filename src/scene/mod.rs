@@ -11,7 +11,8 @@ pub mod material;
 pub mod needs;
 pub mod object;
 pub mod origin;
-mod room;
+mod outline;
+pub mod room;
 pub mod texture;
 
 pub use background::Background;

@@ -2,15 +2,17 @@
 
 use glam::DVec3;
 
+use crate::math::transform::point;
 use crate::math::vector::{cross, dot, length};
 use crate::scene::{Camera, Falloff, Light, LightKind, Rgb, Scene, Shape};
 
 /// A model whose faces look inward, like a stage: walls around, open on one side.
-pub(super) struct Room {
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Room {
     /// The side that is open, as the azimuth to look from, radians.
-    pub(super) azimuth: f64,
+    pub azimuth: f64,
     /// Where a lamp hangs: the middle, a tenth of the height below the top.
-    pub(super) lamp: DVec3,
+    pub lamp: DVec3,
 }
 
 impl Room {
@@ -19,7 +21,7 @@ impl Room {
     /// Faces that look inward enclose a negative volume; a Cornell box reaches -0.8 of its bounding box, while models seen
     /// from outside are positive and scans with flipped faces are bodies that fill far less than half of theirs. The faces
     /// of a closed surface cancel: what remains of their sum points out of the opening.
-    pub(super) fn of(scene: &Scene) -> Option<Self> {
+    pub fn of(scene: &Scene) -> Option<Self> {
         const INWARD: f64 = -0.5;
         let corners = triangles_of(scene);
         let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
@@ -73,7 +75,7 @@ fn triangles_of(scene: &Scene) -> Vec<[DVec3; 3]> {
     for object in &scene.objects {
         if let Shape::Mesh(mesh) = object.shape {
             let mesh = &scene.meshes[mesh as usize];
-            let place = |p: glam::Vec3| object.transform.transform_point3(mesh.origin + p.as_dvec3());
+            let place = |p: glam::Vec3| point(&object.transform, mesh.origin + p.as_dvec3());
             triangles.extend(mesh.live_triangles().map(|number| mesh.triangle(number).map(place)));
         }
     }

@@ -126,7 +126,7 @@ impl Reader<'_> {
             Some(film) => view::read_film(&film.table("the film")?, default)?,
             None => default,
         };
-        Ok(Automatic { camera: auto::complete_camera(&mut self.scene), lights: false })
+        Ok(auto::complete_camera(&mut self.scene))
     }
 
     fn read_cameras(&mut self, root: &Fields<'_>) -> Result<()> {
