@@ -483,6 +483,24 @@ fn info_is_readable_and_its_json_is_stable() {
 }
 
 #[test]
+fn textures_are_named_as_seen_from_the_model() {
+    let workshop = Workshop::new();
+    let folder = workshop.path("maps");
+    fs::create_dir(&folder).unwrap();
+    for path in [folder.join("wood.png"), workshop.path("tin.png")] {
+        image::RgbImage::from_pixel(2, 2, image::Rgb([200, 90, 20])).save(path).unwrap();
+    }
+    let absolute = folder.join("wood.png");
+    workshop.write("model.mtl", &format!("newmtl floor\nmap_Kd {}\nnewmtl box\nmap_Kd tin.png\n", absolute.display()));
+    let model = workshop.path("model.obj");
+    for input in ["model.obj", "./model.obj", model.to_str().unwrap()] {
+        let json: Value = serde_json::from_slice(&workshop.succeed(&format!("info {input} --json"))).unwrap();
+        let names: Vec<_> = json["textures"].as_array().unwrap().iter().map(|texture| &texture["name"]).collect();
+        assert_eq!(names, ["maps/wood.png", "tin.png"], "{input}");
+    }
+}
+
+#[test]
 fn the_statistics_of_a_rendering_are_stable() {
     let workshop = Workshop::new();
     workshop.succeed("render model.obj --size 9x7 --spp 3 --crop 1,1,9,7 --threads 2 --stats-json stats.json");

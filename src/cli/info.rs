@@ -161,7 +161,7 @@ impl<'a> Info<'a> {
         let bytes = Bytes::of(scene);
         let all_triangles = scene.meshes.iter().map(TriangleMesh::triangle_count).sum();
         let texture = |texture: &crate::scene::Texture| TextureInfo {
-            name: texture.name.clone(),
+            name: seen_from(input, &texture.name),
             width: texture.width,
             height: texture.height,
         };
@@ -236,6 +236,14 @@ impl Tree {
         let bytes_per_triangle = (triangles > 0).then(|| bytes / triangles as f64);
         Ok(Self { stats, bytes_per_triangle, validated: arguments.validate })
     }
+}
+
+/// The name of a texture, where that is a path in the folder of `input`, as seen from there.
+fn seen_from(input: &Path, name: &str) -> String {
+    let folder = input.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let path = Path::new(name);
+    let inner = path.strip_prefix(folder).ok().or_else(|| path.strip_prefix(std::path::absolute(folder).ok()?).ok());
+    inner.and_then(Path::to_str).unwrap_or(name).to_owned()
 }
 
 /// Triangles that can be hit, every mesh counted once.

@@ -12,6 +12,8 @@ pub mod scene_file;
 use std::io::Read as _;
 use std::path::Path;
 
+use glam::{DAffine3, DMat3, DVec3};
+
 use crate::error::{Error, Result};
 use crate::progress::Progress;
 use crate::scene::auto::{self, Automatic};
@@ -42,6 +44,16 @@ pub enum UpAxis {
     Y,
     /// +Z: the model is turned about the x axis so that +Z becomes +Y.
     Z,
+}
+
+impl UpAxis {
+    /// The rotation that makes this axis +Y, exact.
+    pub fn to_y(self) -> DAffine3 {
+        match self {
+            Self::Y => DAffine3::IDENTITY,
+            Self::Z => DAffine3::from_mat3(DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y)),
+        }
+    }
 }
 
 /// How a file is read.

@@ -36,7 +36,7 @@ pub(super) fn place<'a>(document: &'a Document, up: UpAxis, ledger: &mut Ledger)
     let mut placed = Vec::with_capacity(root.nodes.len());
     // A stack of our own: a hierarchy may be deeper than the program's.
     let mut waiting: Vec<(Index<Node>, DAffine3)> =
-        roots(root).into_iter().rev().map(|node| (node, turn(up))).collect();
+        roots(root).into_iter().rev().map(|node| (node, up.to_y())).collect();
     while let Some((index, parent)) = waiting.pop() {
         let number = index.value();
         if std::mem::replace(&mut seen[number], true) {
@@ -65,14 +65,6 @@ fn roots(root: &Root) -> Vec<Index<Node>> {
         is_child[child.value()] = true;
     }
     (0..root.nodes.len()).filter(|&number| !is_child[number]).map(|number| Index::new(number as u32)).collect()
-}
-
-/// The rotation that makes the up axis +Y, exact.
-fn turn(up: UpAxis) -> DAffine3 {
-    match up {
-        UpAxis::Y => DAffine3::IDENTITY,
-        UpAxis::Z => DAffine3::from_mat3(DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y)),
-    }
 }
 
 /// From the node's space to its parent's. The last row of a matrix, which glTF demands to be 0 0 0 1, is not read.

@@ -31,10 +31,8 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
-use glam::{DAffine3, DMat3, DVec3};
-
 use crate::error::{Error, Result};
-use crate::formats::{Ledger, LoadOptions, Model, Treatment, UpAxis};
+use crate::formats::{Ledger, LoadOptions, Model, Treatment};
 use crate::progress::Progress;
 use crate::scene::{Material, Object, Shape};
 use library::Libraries;
@@ -72,11 +70,8 @@ pub fn load(path: &Path, options: &LoadOptions, progress: &dyn Progress) -> Resu
     let mut textures = Textures::default();
     let materials = material_names.iter().map(|name| material(name.as_deref(), &libraries, &mut textures, &mut ledger));
     let materials = materials.collect();
-    let transform = match options.up {
-        UpAxis::Y => DAffine3::IDENTITY,
-        UpAxis::Z => DAffine3::from_mat3(DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y)),
-    };
-    let object = Object { name: name.into_owned(), shape: Shape::Mesh(0), transform, material: None };
+    let object =
+        Object { name: name.into_owned(), shape: Shape::Mesh(0), transform: options.up.to_y(), material: None };
     Ok(Model {
         meshes: vec![mesh],
         materials,

@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-use glam::Vec3;
+use glam::{DAffine3, DVec3, Vec3};
 
 use super::*;
-use crate::formats::NormalMode;
+use crate::formats::{NormalMode, UpAxis};
 use crate::geometry::TriangleMesh;
 use crate::geometry::mesh::Materials;
 use crate::progress::Silent;
