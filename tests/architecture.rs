@@ -1,4 +1,4 @@
-//! The import rule: data flows one way. Reads the source and fails on a backward `crate::` path.
+//! Rules that the source keeps: imports go one way, and arithmetic is the same on every machine. Read from its text.
 
 use std::path::{Path, PathBuf};
 
@@ -88,4 +88,115 @@ fn imports_go_one_way() {
         }
     }
     assert!(wrong.is_empty(), "backward imports:\n{}", wrong.join("\n"));
+}
+
+/// Functions whose last bits depend on the platform or the build: sums in an order of glam's choice, and std's
+/// transcendental functions. Square roots are exact everywhere.
+const PLATFORM_ARITHMETIC: &[&str] = &[
+    // glam; `math::vector` and `math::transform` have what is needed of these.
+    "dot",
+    "length",
+    "length_squared",
+    "length_recip",
+    "normalize",
+    "normalize_or",
+    "normalize_or_zero",
+    "try_normalize",
+    "distance",
+    "distance_squared",
+    "angle_between",
+    "project_onto",
+    "reject_from",
+    "reflect",
+    "refract",
+    "element_sum",
+    "determinant",
+    "inverse",
+    "transform_point3",
+    "transform_vector3",
+    "mul_vec3",
+    "mul_mat3",
+    "from_quat",
+    "from_axis_angle",
+    "from_euler",
+    "from_rotation_x",
+    "from_rotation_y",
+    "from_rotation_z",
+    "from_scale_rotation_translation",
+    "look_at_rh",
+    // std; the crate `libm` has these.
+    "mul_add",
+    "powf",
+    "powi",
+    "sin",
+    "cos",
+    "tan",
+    "sin_cos",
+    "asin",
+    "acos",
+    "atan",
+    "atan2",
+    "sinh",
+    "cosh",
+    "tanh",
+    "exp",
+    "exp2",
+    "exp_m1",
+    "ln",
+    "ln_1p",
+    "log",
+    "log2",
+    "log10",
+    "cbrt",
+    "hypot",
+];
+
+/// Calls of such functions in a source text, as methods or by the name of a type (of f32, f64 or glam); comments and the
+/// module of tests at the end are left out.
+fn platform_arithmetic(source: &str) -> Vec<String> {
+    let code = source.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default();
+    let mut found = Vec::new();
+    for (number, line) in code.lines().enumerate().filter(|(_, line)| !line.trim_start().starts_with("//")) {
+        for (at, _) in line.match_indices('(') {
+            let start = line[..at].rfind(|c: char| !(c.is_alphanumeric() || c == '_')).map_or(0, |before| before + 1);
+            let (before, name) = (&line[..start], &line[start..at]);
+            let of_type = before.strip_suffix("::").is_some_and(|path| {
+                let owner = path.rsplit(|c: char| !(c.is_alphanumeric() || c == '_')).next().unwrap_or_default();
+                ["f32", "f64"].contains(&owner)
+                    || owner.contains("Vec")
+                    || owner.contains("Mat")
+                    || owner.contains("Quat")
+                    || owner.contains("Affine")
+            });
+            if PLATFORM_ARITHMETIC.contains(&name) && (before.ends_with('.') || of_type) {
+                found.push(format!("{}: {name}", number + 1));
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn platform_arithmetic_is_found_where_it_stands() {
+    let source = "a.dot(b); dot(a, b);\n// a.length()\nlet x = libm::sin(y) + f64::sin(y).sqrt();\nDMat3::from_quat(q)\n\
+                  v\n    .normalize()\n#[cfg(test)]\nmod tests {\n    a.dot(b)\n}";
+    assert_eq!(platform_arithmetic(source), ["1: dot", "3: sin", "4: from_quat", "6: normalize"]);
+}
+
+#[test]
+fn arithmetic_is_the_same_on_every_machine() {
+    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut files = Vec::new();
+    rust_files(&src, &mut files);
+    let is_test =
+        |inner: &Path| inner.components().any(|part| ["tests", "tests.rs"].iter().any(|t| part.as_os_str() == *t));
+    let mut wrong = Vec::new();
+    for file in files {
+        let inner = file.strip_prefix(&src).unwrap();
+        if !is_test(inner) {
+            let found = platform_arithmetic(&std::fs::read_to_string(&file).unwrap());
+            wrong.extend(found.into_iter().map(|call| format!("{}:{call}", inner.display())));
+        }
+    }
+    assert!(wrong.is_empty(), "use `math` or `libm` instead:\n{}", wrong.join("\n"));
 }

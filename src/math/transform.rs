@@ -1,6 +1,6 @@
 //! Affine transforms in f64, with the inverse computed once.
 
-use glam::{DAffine3, DMat3, DVec3};
+use glam::{DAffine3, DMat3, DVec3, DVec4};
 
 use crate::error::{Error, Result};
 use crate::math::vector::{cross, dot};
@@ -114,6 +114,17 @@ pub fn compose(outer: &DAffine3, inner: &DAffine3) -> DAffine3 {
     DAffine3 { matrix3, translation: point(outer, inner.translation) }
 }
 
+/// The rotation by a unit quaternion, scalar last.
+pub fn rotation_by(q: DVec4) -> DMat3 {
+    let DVec4 { x, y, z, w } = q;
+    let (x2, y2, z2) = (2.0 * x, 2.0 * y, 2.0 * z);
+    DMat3::from_cols(
+        DVec3::new(1.0 - (y * y2 + z * z2), x * y2 + w * z2, x * z2 - w * y2),
+        DVec3::new(x * y2 - w * z2, 1.0 - (x * x2 + z * z2), y * z2 + w * x2),
+        DVec3::new(x * z2 + w * y2, y * z2 - w * x2, 1.0 - (x * x2 + y * y2)),
+    )
+}
+
 /// A rotation by `angle` radians about the unit vector `axis` through the origin, right-handed (Rodrigues).
 pub fn rotation_about(axis: DVec3, angle: f64) -> DMat3 {
     let (sin, cos) = libm::sincos(angle);
@@ -167,6 +178,18 @@ mod tests {
         assert!(near(rotation_about(DVec3::Y, quarter) * DVec3::Z, DVec3::X));
         let diagonal = DVec3::ONE / 3f64.sqrt();
         assert!(near(rotation_about(diagonal, 4.0 * quarter / 3.0) * DVec3::X, DVec3::Y));
+    }
+
+    #[test]
+    fn quaternions_turn_as_their_axis_and_angle_do() {
+        for (axis, angle) in [(DVec3::X, 0.3), (DVec3::new(0.6, -0.48, 0.64), 2.9), (DVec3::NEG_Z, -1.0)] {
+            let (sin, cos) = libm::sincos(0.5 * angle);
+            let (turn, expected) = (rotation_by((axis * sin).extend(cos)), rotation_about(axis, angle));
+            for v in [DVec3::X, DVec3::Y, DVec3::Z] {
+                assert!((turn * v - expected * v).abs().max_element() < 1e-15, "{axis} {angle}");
+            }
+        }
+        assert_eq!(rotation_by(DVec4::W), DMat3::IDENTITY);
     }
 
     #[test]

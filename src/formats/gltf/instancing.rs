@@ -7,7 +7,7 @@ use serde_json::Value;
 use super::accessor::Accessor;
 use super::budget::Budget;
 use super::buffers::Buffers;
-use super::nodes::compose;
+use super::nodes::scale_rotate_translate;
 use crate::error::{Error, Result};
 use crate::formats::Ledger;
 use crate::scene::Object;
@@ -50,7 +50,7 @@ pub(super) fn instances(
     let rotations: Option<Vec<Vec4>> = rotation.as_ref().map(|r| r.vectors::<4, _>(None)).transpose()?;
     let scales: Option<Vec<Vec3>> = scale.as_ref().map(|s| s.vectors::<3, _>(None)).transpose()?;
     let instance = |i: usize| {
-        compose(
+        scale_rotate_translate(
             translations.as_ref().map_or(DVec3::ZERO, |all| all[i].as_dvec3()),
             rotations.as_ref().map_or(DVec4::W, |all| all[i].as_dvec4()),
             scales.as_ref().map_or(DVec3::ONE, |all| all[i].as_dvec3()),

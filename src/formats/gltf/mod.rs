@@ -35,6 +35,7 @@ use ::gltf::json::Root;
 use crate::error::{Error, Result};
 use crate::formats::{Ledger, LoadOptions, Model, Treatment};
 use crate::math::Transform;
+use crate::math::transform::compose;
 use crate::progress::Progress;
 use crate::scene::{Object, Shape};
 use budget::Budget;
@@ -161,7 +162,7 @@ fn place_objects(
     let instances = instancing::instances(root, buffers, placed.node, budget, ledger)
         .map_err(|error| error.within(format_args!("nodes[{}]", placed.number)))?;
     let transforms = match instances {
-        Some(instances) => instances.into_iter().map(|instance| placed.to_world * instance).collect(),
+        Some(instances) => instances.into_iter().map(|instance| compose(&placed.to_world, &instance)).collect(),
         None => {
             budget.take::<Object>(1)?;
             vec![placed.to_world]

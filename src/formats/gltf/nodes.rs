@@ -1,11 +1,12 @@
 //! The node hierarchy: where everything stands, in f64.
 
 use ::gltf::json::{Index, Node, Root};
-use glam::{DAffine3, DMat3, DQuat, DVec3, DVec4};
+use glam::{DAffine3, DMat3, DVec3, DVec4};
 
 use super::document::{Document, Placement};
 use crate::error::{Error, Result};
 use crate::formats::{Ledger, Treatment, UpAxis};
+use crate::math::transform::{compose, rotation_by};
 
 /// A node of the scene with its place in the world.
 #[derive(Debug)]
@@ -44,7 +45,7 @@ pub(super) fn place<'a>(document: &'a Document, up: UpAxis, ledger: &mut Ledger)
             return Err(Error::file(text).remedy("glTF wants a tree: export the file again"));
         }
         let (node, placement) = (&root.nodes[number], &document.placements[number]);
-        let to_world = parent * local(placement, ledger);
+        let to_world = compose(&parent, &local(placement, ledger));
         waiting.extend(node.children.iter().flatten().rev().map(|&child| (child, to_world)));
         placed.push(PlacedNode { number, node, to_world });
     }
@@ -74,7 +75,7 @@ fn local(placement: &Placement, ledger: &mut Ledger) -> DAffine3 {
         return DAffine3 { matrix3: DMat3::from_cols(column(0), column(1), column(2)), translation: column(3) };
     }
     let rotation = DVec4::from(placement.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]));
-    compose(
+    scale_rotate_translate(
         DVec3::from(placement.translation.unwrap_or([0.0; 3])),
         rotation,
         DVec3::from(placement.scale.unwrap_or([1.0; 3])),
@@ -83,16 +84,21 @@ fn local(placement: &Placement, ledger: &mut Ledger) -> DAffine3 {
 }
 
 /// Scale, then rotation by a quaternion (scalar last, of any length), then translation.
-pub(super) fn compose(translation: DVec3, rotation: DVec4, scale: DVec3, ledger: &mut Ledger) -> DAffine3 {
+pub(super) fn scale_rotate_translate(
+    translation: DVec3,
+    rotation: DVec4,
+    scale: DVec3,
+    ledger: &mut Ledger,
+) -> DAffine3 {
     let length =
         (rotation.x * rotation.x + rotation.y * rotation.y + rotation.z * rotation.z + rotation.w * rotation.w).sqrt();
     let unit = if length > 0.0 && length < f64::INFINITY {
-        DQuat::from_vec4(rotation / length)
+        rotation / length
     } else {
         ledger.note(Treatment::Warning, "rotation by a quaternion of length 0: not rotated", 1);
-        DQuat::IDENTITY
+        DVec4::W
     };
-    let r = DMat3::from_quat(unit);
+    let r = rotation_by(unit);
     let matrix3 = DMat3::from_cols(r.x_axis * scale.x, r.y_axis * scale.y, r.z_axis * scale.z);
     DAffine3 { matrix3, translation }
 }
