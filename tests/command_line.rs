@@ -280,12 +280,39 @@ fn threads_and_accelerators_do_not_change_a_byte() {
     }
 }
 
+/// The first and last column and row, from 0, in which a ray hits something.
+fn box_of_hits(workshop: &Workshop, flags: &str, width: usize) -> [usize; 4] {
+    workshop.succeed(&format!("render model.obj --spp 1 --aov id -o view.png {flags}"));
+    let image = exr::prelude::read_first_flat_layer_from_file(workshop.path("view.aov.exr")).unwrap();
+    let ids = image.layer_data.channel_data.list.iter().find(|channel| channel.name.to_string() == "id.instance");
+    let ids: Vec<u32> = match &ids.unwrap().sample_data {
+        exr::prelude::FlatSamples::U32(ids) => ids.clone(),
+        other => panic!("{other:?}"),
+    };
+    let hits = || ids.iter().enumerate().filter(|(_, id)| **id != 0).map(|(at, _)| (at % width, at / width));
+    let (xs, ys) = (|| hits().map(|hit| hit.0), || hits().map(|hit| hit.1));
+    [xs().min().unwrap(), xs().max().unwrap(), ys().min().unwrap(), ys().max().unwrap()]
+}
+
 #[test]
 fn views_differ_and_fill_the_picture() {
     let workshop = Workshop::new();
+    let (width, height) = (120, 90);
+    // The margin is 6 % of each side. Of a sharp tip the last pixels may be missing, since their centres lie beside it.
+    const TIP: f64 = 3.0;
+    let (beside, above) = (0.06 * width as f64, 0.06 * height as f64);
+    let touches = |border: usize, margin: f64| (border as f64 - margin).abs() <= TIP;
     let mut seen = BTreeSet::new();
-    for flags in ["", "--view front", "--view back", "--view top", "--orbit -40,10", "--view front --fov 80"] {
-        assert!(seen.insert(workshop.png(&format!("--size 24x18 --spp 1 {flags}"))), "{flags}");
+    for flags in ["", "--view front", "--view back", "--view top", "--orbit -40,10", "--orbit -40,40 --fov 80"] {
+        let [left, right, top, bottom] = box_of_hits(&workshop, &format!("--size {width}x{height} {flags}"), width);
+        let (right, bottom) = (width - 1 - right, height - 1 - bottom);
+        let fills_width = touches(left, beside) && touches(right, beside);
+        let fills_height = touches(top, above) && touches(bottom, above);
+        assert!(fills_width || fills_height, "{flags}: {left} {right} {top} {bottom}");
+        let least_beside = left.min(right) as f64;
+        let least_above = top.min(bottom) as f64;
+        assert!(least_beside >= beside - TIP && least_above >= above - TIP, "{flags}: {left} {right} {top} {bottom}");
+        assert!(seen.insert(fs::read(workshop.path("view.png")).unwrap()), "{flags}");
     }
 }
 

@@ -79,7 +79,7 @@ pub use crate::dispatch_kind;
 macro_rules! define_kind {
     ({} $($name:ident $text:literal $description:literal;)+) => {
         /// Which acceleration structure to use for triangles.
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Serialize, serde::Deserialize)]
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Serialize)]
         #[serde(rename_all = "lowercase")]
         pub enum Kind {
             /// The fastest one.
@@ -120,7 +120,7 @@ impl Kind {
 }
 
 /// How much time a build may take for faster rays.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Preset {
     /// Quickest build, slower rays.

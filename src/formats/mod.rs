@@ -23,7 +23,7 @@ pub use ledger::{Ledger, Treatment};
 pub use model::Model;
 
 /// Which shading normals a mesh gets.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Deserialize, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum NormalMode {
     /// Those of the file; where it has none, what its format prescribes (flat).
@@ -36,7 +36,7 @@ pub enum NormalMode {
 }
 
 /// Which axis of a model file points up.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Deserialize, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum UpAxis {
     /// +Y: glTF always, OBJ mostly.
