@@ -15,9 +15,12 @@ use crate::geometry::bounds::Bounds;
 pub struct TriangleMesh {
     /// What to call the mesh in messages.
     pub name: String,
-    /// Where the positions are relative to, in the file's coordinates: add it to a position to get the file's value.
+    /// Where the positions are relative to, in the file's coordinates; see [`file_position`](Self::file_position).
     pub origin: DVec3,
-    /// Vertex positions in object space, relative to `origin`.
+    /// Positions are the file's divided by 2 to this: 0 but for meshes so large or small that products of three of
+    /// their coordinates leave f32. Filled by [`finish`](Self::finish).
+    pub exponent: i32,
+    /// Vertex positions, relative to `origin` and divided by 2 to the `exponent`.
     pub positions: Vec<Vec3>,
     /// Vertex numbers, three per triangle.
     pub indices: Vec<[u32; 3]>,
@@ -104,6 +107,7 @@ impl TriangleMesh {
                 self.indices.len()
             )));
         }
+        self.bring_into_range();
         let mut counts = DroppedCounts::default();
         let mut dropped = Vec::new();
         for (number, indices) in self.indices.iter().enumerate() {
@@ -126,6 +130,37 @@ impl TriangleMesh {
         self.dropped = dropped;
         self.dropped_counts = counts;
         Ok(self)
+    }
+
+    /// Where a position of this mesh stands in the file's coordinates.
+    #[inline]
+    pub fn file_position(&self, position: Vec3) -> DVec3 {
+        self.origin + position.as_dvec3() * self.scale()
+    }
+
+    /// 2 to the `exponent`: what multiplies a position to give the file's.
+    pub fn scale(&self) -> f64 {
+        libm::ldexp(1.0, self.exponent)
+    }
+
+    /// Divides the positions by a power of two, exactly, where most of them lie beyond [`LARGEST_COORDINATE`] or all
+    /// but within its reciprocal. A few vertices far out do not count: their triangles are dropped.
+    fn bring_into_range(&mut self) {
+        let usual = 1.0 / LARGEST_COORDINATE..=LARGEST_COORDINATE;
+        let magnitude = |p: &Vec3| p.is_finite().then(|| p.abs().max_element()).filter(|&m| m > 0.0);
+        let largest = self.positions.iter().filter_map(magnitude).fold(0.0, f32::max);
+        if largest == 0.0 || usual.contains(&largest) {
+            return;
+        }
+        let mut magnitudes: Vec<f32> = self.positions.iter().filter_map(magnitude).collect();
+        let middle = magnitudes.len() / 2;
+        let (_, &mut median, _) = magnitudes.select_nth_unstable_by(middle, f32::total_cmp);
+        if !usual.contains(&median) {
+            let exponent = libm::ilogbf(median);
+            let shrink = |x: f32| libm::scalbnf(x, -exponent);
+            self.positions.iter_mut().for_each(|p| *p = Vec3::new(shrink(p.x), shrink(p.y), shrink(p.z)));
+            self.exponent += exponent;
+        }
     }
 
     /// Number of triangles in the file, dropped ones included.
@@ -236,6 +271,25 @@ mod tests {
         assert_eq!(mesh.dropped_counts, DroppedCounts { non_finite: 2, zero_area: 2, bad_index: 1 });
         assert_eq!(mesh.live_triangles().collect::<Vec<_>>(), [1, 6]);
         assert_eq!(mesh.bounds(), Bounds { min: Vec3::ZERO, max: Vec3::new(1.0, 1.0, 0.0) });
+    }
+
+    #[test]
+    fn huge_and_tiny_meshes_are_scaled_by_a_power_of_two() {
+        for size in [1e13f32, 1.8e18, 1e30, 1e-13, 1e-25] {
+            let positions = vec![Vec3::ZERO, Vec3::X * size, Vec3::new(0.3, 0.7, 0.1) * size];
+            let mesh = TriangleMesh { positions: positions.clone(), indices: vec![[0, 1, 2]], ..Default::default() };
+            let mesh = mesh.finish().unwrap();
+            assert_eq!(mesh.live_count(), 1, "{size:e}");
+            assert!((0.5..=2.0).contains(&mesh.positions[1].x), "{size:e}");
+            for (&stored, given) in mesh.positions.iter().zip(positions) {
+                assert_eq!(mesh.file_position(stored), given.as_dvec3(), "{size:e}");
+            }
+        }
+        // One vertex far out leaves the others alone.
+        let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::splat(3e38)];
+        let mesh = TriangleMesh { positions, indices: vec![[0, 1, 2], [0, 1, 3]], ..Default::default() };
+        let mesh = mesh.finish().unwrap();
+        assert_eq!((mesh.exponent, mesh.live_count()), (0, 1));
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The scene's objects made relative to its origin and ready for rays: transforms with inverses, world boxes.
 
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DMat3, DVec3};
 
 use crate::error::{Error, Result};
 use crate::geometry::ray::Interval;
@@ -54,14 +54,15 @@ impl World {
             .map(|mesh| !mesh.live_triangles().any(|n| scene.materials[mesh.material(n) as usize].is_transmissive()))
             .collect();
         let prepare = |object: &crate::scene::Object| {
-            let (shape_origin, bounds, opaque) = match object.shape {
+            let (shape_origin, scale, bounds, opaque) = match object.shape {
                 Shape::Mesh(mesh) => {
                     let number = mesh as usize;
-                    (scene.meshes[number].origin, Some(mesh_bounds[number]), mesh_opaque[number])
+                    let mesh = &scene.meshes[number];
+                    (mesh.origin, mesh.scale(), Some(mesh_bounds[number]), mesh_opaque[number])
                 }
-                Shape::Quadric(quadric) => (DVec3::ZERO, scene.quadrics[quadric as usize].bounds(), true),
+                Shape::Quadric(quadric) => (DVec3::ZERO, 1.0, scene.quadrics[quadric as usize].bounds(), true),
             };
-            let transform = Transform::new(relative(&object.transform, shape_origin, scene.origin))
+            let transform = Transform::new(relative(&object.transform, shape_origin, scale, scene.origin))
                 .map_err(|error| error.remedy(format!("object `{}`: scales must not be 0", object.name)))?;
             Ok(Instance {
                 shape: object.shape,
@@ -107,10 +108,11 @@ impl Instance {
     }
 }
 
-/// `p -> transform (shape_origin + p) - scene_origin`, exactly the identity where nothing moves.
-fn relative(transform: &DAffine3, shape_origin: DVec3, scene_origin: DVec3) -> DAffine3 {
+/// `p -> transform (shape_origin + scale p) - scene_origin`, exactly the identity where nothing moves.
+fn relative(transform: &DAffine3, shape_origin: DVec3, scale: f64, scene_origin: DVec3) -> DAffine3 {
     let m = transform.matrix3;
     let moved = m.x_axis * shape_origin.x + m.y_axis * shape_origin.y + m.z_axis * shape_origin.z;
+    let scaled = DMat3::from_cols(m.x_axis * scale, m.y_axis * scale, m.z_axis * scale);
     // The difference first: for an untransformed mesh it is an exact difference of origins, usually zero.
-    DAffine3 { matrix3: m, translation: (moved - scene_origin) + transform.translation }
+    DAffine3 { matrix3: scaled, translation: (moved - scene_origin) + transform.translation }
 }

@@ -39,12 +39,17 @@ impl Extents {
     /// The corners of the box around what the object shows, in the file's coordinates; `None` if that is nothing or goes
     /// to infinity. The corners bound the object, tightly unless it is turned or sheared.
     pub fn corners(&self, scene: &Scene, object: &Object) -> Option<[DVec3; 8]> {
-        let (origin, bounds) = match object.shape {
-            Shape::Mesh(mesh) => (scene.meshes[mesh as usize].origin, Some(self.meshes[mesh as usize])),
-            Shape::Quadric(quadric) => (DVec3::ZERO, scene.quadrics[quadric as usize].bounds()),
-        };
-        let bounds = bounds.filter(|bounds| !bounds.is_empty())?;
-        Some(bounds.corners().map(|corner| point(&object.transform, origin + corner.as_dvec3())))
+        match object.shape {
+            Shape::Mesh(number) => {
+                let mesh = &scene.meshes[number as usize];
+                let bounds = Some(&self.meshes[number as usize]).filter(|bounds| !bounds.is_empty())?;
+                Some(bounds.corners().map(|corner| point(&object.transform, mesh.file_position(corner))))
+            }
+            Shape::Quadric(quadric) => {
+                let bounds = scene.quadrics[quadric as usize].bounds().filter(|bounds| !bounds.is_empty())?;
+                Some(bounds.corners().map(|corner| point(&object.transform, corner.as_dvec3())))
+            }
+        }
     }
 
     /// What keeps the object from being rendered, if anything. Of what goes to infinity, the place alone counts.

@@ -18,8 +18,8 @@ pub struct Object {
     pub name: String,
     /// What is placed.
     pub shape: Shape,
-    /// From the shape's coordinates to the file's world, f64. A mesh's own origin is added before: a mesh vertex `p`
-    /// stands at `transform * (mesh.origin + p)`.
+    /// From the shape's coordinates to the file's world, f64. A mesh vertex `p` stands at
+    /// `transform * mesh.file_position(p)`.
     pub transform: DAffine3,
     /// Replaces the shape's own material; quadrics must have one.
     pub material: Option<u32>,

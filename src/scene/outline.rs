@@ -55,7 +55,7 @@ fn mesh_of<'a>(scene: &'a Scene, object: &Object) -> Option<&'a TriangleMesh> {
 
 /// The corners of the triangles that can be hit, one triangle after the other.
 fn placed_corners(mesh: &TriangleMesh, object: &Object) -> impl Iterator<Item = DVec3> {
-    let place = |p: Vec3| point(&object.transform, mesh.origin + p.as_dvec3());
+    let place = |p: Vec3| point(&object.transform, mesh.file_position(p));
     mesh.live_triangles().flat_map(|number| mesh.triangle(number)).map(place)
 }
 

@@ -75,7 +75,7 @@ fn triangles_of(scene: &Scene) -> Vec<[DVec3; 3]> {
     for object in &scene.objects {
         if let Shape::Mesh(mesh) = object.shape {
             let mesh = &scene.meshes[mesh as usize];
-            let place = |p: glam::Vec3| point(&object.transform, mesh.origin + p.as_dvec3());
+            let place = |p: glam::Vec3| point(&object.transform, mesh.file_position(p));
             triangles.extend(mesh.live_triangles().map(|number| mesh.triangle(number).map(place)));
         }
     }
