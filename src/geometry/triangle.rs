@@ -32,7 +32,7 @@ pub fn intersect_triangle(ray: &PreparedRay, a: Vec3, b: Vec3, c: Vec3) -> Optio
     let (sx, sy, sz) = (ray.shear.x, ray.shear.y, ray.shear.z);
 
     // Move the origin to zero and shear the ray onto the z axis: the question becomes two-dimensional.
-    let (a_rel, b_rel, c_rel) = (a - ray.origin, b - ray.origin, c - ray.origin);
+    let [a_rel, b_rel, c_rel] = [a, b, c].map(|p| (p - ray.origin).to_array());
     let (ax, ay) = (a_rel[kx] - sx * a_rel[kz], a_rel[ky] - sy * a_rel[kz]);
     let (bx, by) = (b_rel[kx] - sx * b_rel[kz], b_rel[ky] - sy * b_rel[kz]);
     let (cx, cy) = (c_rel[kx] - sx * c_rel[kz], c_rel[ky] - sy * c_rel[kz]);
