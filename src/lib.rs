@@ -54,8 +54,8 @@
 //!   from the unrounded ray in f64 and rounded once; f32 decides only what is hit.
 //! - *Culling by the best t alone*: a computed t may lie before its triangle's box, and trees then disagree. Every t is
 //!   clamped into its own box's interval first ([`geometry::triangle`]).
-//! - *World-space f32 matrices for quadrics*: at a distance of 1e4 radii they get 30 % of the hits wrong.
-//!   Quadrics are solved in f64 in object space.
+//! - *World-space f32 matrices for quadrics*: far from the origin the discriminant's sign is rounding noise. Quadrics
+//!   are solved in f64 in object space.
 
 pub mod accel;
 #[cfg(feature = "cli")]

@@ -3,7 +3,7 @@
 use glam::{DAffine3, DVec3, Vec3};
 use whitted::geometry::quadric::Clip;
 use whitted::geometry::{Quadric, shapes};
-use whitted::scene::{Camera, Clamp, FilmSettings, Light, LightKind, Material, NamedCamera, Rgb};
+use whitted::scene::{Camera, Clamp, FilmSettings, Light, LightKind, Material, NamedCamera, Rgb, Scene};
 
 use crate::common::*;
 
@@ -13,6 +13,12 @@ fn near(a: Rgb, b: Rgb, tolerance: f32) {
 
 fn placed(center: DVec3, radius: f64) -> DAffine3 {
     DAffine3::from_translation(center) * DAffine3::from_scale(DVec3::splat(radius))
+}
+
+/// Adds the plane z = 0 as a large square that faces +Z.
+fn add_wall(scene: &mut Scene, material: Material) {
+    let wall = rectangle(Vec3::new(-9.0, -9.0, 0.0), Vec3::X * 18.0, Vec3::Y * 18.0);
+    add_mesh(scene, wall, DAffine3::IDENTITY, material);
 }
 
 #[test]
@@ -28,12 +34,7 @@ fn every_term_of_the_formula_at_one_point() {
         ..black()
     };
     let mut scene = empty_scene();
-    add_mesh(
-        &mut scene,
-        rectangle(Vec3::new(-9.0, -9.0, 0.0), Vec3::X * 18.0, Vec3::Y * 18.0),
-        DAffine3::IDENTITY,
-        material,
-    );
+    add_wall(&mut scene, material);
     let light = Rgb::new(0.9, 0.8, 0.7);
     add_light(&mut scene, DVec3::new(3.0, 0.0, 4.0), light);
     let highlight = 0.8f32.powi(3) * 0.3;
@@ -51,12 +52,7 @@ fn every_term_of_the_formula_at_one_point() {
 #[test]
 fn a_surface_is_lit_only_from_the_side_it_is_seen_from() {
     let mut scene = empty_scene();
-    add_mesh(
-        &mut scene,
-        rectangle(Vec3::new(-9.0, -9.0, 0.0), Vec3::X * 18.0, Vec3::Y * 18.0),
-        DAffine3::IDENTITY,
-        white(),
-    );
+    add_wall(&mut scene, white());
     add_light(&mut scene, DVec3::new(0.0, 0.0, -4.0), Rgb::ONE);
     assert_eq!(pixel(&scene), Rgb::ZERO, "from behind");
     scene.lights.clear();
@@ -259,12 +255,7 @@ fn a_lamp_on_a_ceiling_shines_at_every_angle() {
 #[test]
 fn spots_and_falloff_follow_their_definitions() {
     let mut scene = empty_scene();
-    add_mesh(
-        &mut scene,
-        rectangle(Vec3::new(-9.0, -9.0, 0.0), Vec3::X * 18.0, Vec3::Y * 18.0),
-        DAffine3::IDENTITY,
-        white(),
-    );
+    add_wall(&mut scene, white());
     let spot = |angle: f64| {
         // The axis misses the lit point by `angle`.
         let (sin, cos) = angle.to_radians().sin_cos();
