@@ -10,7 +10,7 @@ use crate::render::film::{Aov, AovKind, Film};
 use crate::render::intersect::Intersect;
 use crate::render::sampling;
 use crate::render::settings::{Crop, RayCounts, RenderSettings, RenderStats};
-use crate::render::surface::{SurfacePoint, texture_coordinates};
+use crate::render::surface::SurfacePoint;
 use crate::render::trace::Tracer;
 use crate::render::world::World;
 use crate::scene::camera::{CameraRays, ViewRay};
@@ -19,8 +19,8 @@ use crate::scene::{Background, Scene};
 /// Side of a tile in pixels: 32 x 32 pixels keep a thread busy for long enough and share well.
 const TILE: u32 = 32;
 
-/// Stack of a rendering thread: room for a recursion of [`LARGEST_DEPTH`](crate::scene::film::LARGEST_DEPTH) (a frame
-/// is well below 2 KiB).
+/// Stack of a rendering thread: 16 KiB for each level of the deepest recursion,
+/// [`LARGEST_DEPTH`](crate::scene::film::LARGEST_DEPTH), which a test goes to.
 const STACK: usize = 16 << 20;
 
 /// The most pixels that are rendered at once: 2^28, which take 6 GiB while tiles are put together.
@@ -181,25 +181,21 @@ fn record<I: Intersect>(
     aovs: &[AovKind],
     channels: &mut [Vec<f32>],
 ) {
-    let found =
-        view.filter(|_| hit.is_hit()).map(|view| (view, SurfacePoint::of(tracer.scene, tracer.world, view, hit)));
+    let found = view.filter(|_| hit.is_hit()).map(|view| SurfacePoint::of(tracer.scene, tracer.world, view, hit));
     let mut channels = channels.iter_mut();
     for kind in aovs {
         let values = match (&found, kind) {
             (None, AovKind::Depth) => [f32::INFINITY, 0.0, 0.0],
             (None, _) => [0.0; 3],
             (Some(_), AovKind::Depth) => [hit.t, 0.0, 0.0],
-            (Some((_, point)), AovKind::Normal) => point.normal.as_vec3().to_array(),
-            (Some((_, point)), AovKind::Position) => (point.position + tracer.scene.origin).as_vec3().to_array(),
-            (Some((view, _)), AovKind::Uv) => {
-                let uv = texture_coordinates(tracer.scene, tracer.world, view, hit);
+            (Some(point), AovKind::Normal) => point.normal.as_vec3().to_array(),
+            (Some(point), AovKind::Position) => (point.position + tracer.scene.origin).as_vec3().to_array(),
+            (Some(point), AovKind::Uv) => {
+                let uv = point.texture_coordinates(tracer.scene, hit);
                 [uv.x as f32, uv.y as f32, 0.0]
             }
             (Some(_), AovKind::Id) => [f32::from_bits(hit.instance + 1), f32::from_bits(hit.primitive + 1), 0.0],
-            (Some((view, point)), AovKind::Albedo) => {
-                let material = &tracer.scene.materials[point.material as usize];
-                tracer.colors(material, view, hit).diffuse.to_array()
-            }
+            (Some(point), AovKind::Albedo) => tracer.colors(point, hit).diffuse.to_array(),
         };
         for (value, channel) in values.into_iter().zip(channels.by_ref().take(kind.channels().len())) {
             channel.push(value);

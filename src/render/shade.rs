@@ -7,7 +7,7 @@ use crate::geometry::Hit;
 use crate::math::vector::{dot, normalize};
 use crate::render::intersect::Intersect;
 use crate::render::shadow::Illumination;
-use crate::render::surface::{SurfacePoint, texture_coordinates};
+use crate::render::surface::SurfacePoint;
 use crate::render::trace::{TracedRay, Tracer};
 use crate::scene::camera::ViewRay;
 use crate::scene::{Clamp, Material, Rgb};
@@ -36,7 +36,7 @@ impl<I: Intersect> Tracer<'_, I> {
     pub fn shade(&self, view: &ViewRay, hit: &Hit, depth: u32) -> Rgb {
         let point = SurfacePoint::of(self.scene, self.world, view, hit);
         let material = &self.scene.materials[point.material as usize];
-        let colors = self.colors(material, view, hit);
+        let colors = self.colors(&point, hit);
 
         // Ambient, then each light: diffuse and highlight.
         let mut color = colors.ambient;
@@ -65,11 +65,12 @@ impl<I: Intersect> Tracer<'_, I> {
         }
     }
 
-    /// The material's colours at a hit.
-    pub fn colors(&self, material: &Material, view: &ViewRay, hit: &Hit) -> SurfaceColors {
+    /// The colours of the point that `hit` found.
+    pub fn colors(&self, point: &SurfacePoint, hit: &Hit) -> SurfaceColors {
+        let material = &self.scene.materials[point.material as usize];
         let texel = match material.diffuse_texture {
             Some(reference) => {
-                let uv = texture_coordinates(self.scene, self.world, view, hit);
+                let uv = point.texture_coordinates(self.scene, hit);
                 self.scene.textures[reference.texture as usize].sample(uv * reference.scale + reference.offset)
             }
             None => Rgb::ONE,

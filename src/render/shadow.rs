@@ -82,22 +82,13 @@ impl<I: Intersect> Tracer<'_, I> {
         }
         let mut hit = self.intersect.next_transmissive_after(&ray, Key::BEFORE_ALL);
         while hit.is_hit() {
-            visible *= self.scene.materials[self.material_of(&hit) as usize].kt;
+            visible *= self.scene.materials[self.scene.material_of(hit.instance, hit.primitive) as usize].kt;
             if visible == Rgb::ZERO {
                 break;
             }
             hit = self.intersect.next_transmissive_after(&ray, hit.key());
         }
         visible
-    }
-
-    /// The material of what was hit.
-    fn material_of(&self, hit: &crate::geometry::Hit) -> u32 {
-        let object = &self.scene.objects[hit.instance as usize];
-        object.material.unwrap_or_else(|| match object.shape {
-            crate::scene::Shape::Mesh(mesh) => self.scene.meshes[mesh as usize].material(hit.primitive),
-            crate::scene::Shape::Quadric(_) => 0,
-        })
     }
 }
 

@@ -24,6 +24,28 @@ pub struct SurfacePoint {
     pub material: u32,
     /// How far intersections with this surface may be off along its normal.
     offset: f64,
+    place: Place,
+}
+
+/// Where a point is on its own surface.
+#[derive(Debug, Clone, Copy)]
+enum Place {
+    /// The weights of a triangle's corners.
+    Weights([f64; 3]),
+    /// A quadric's point in object space.
+    Point(DVec3),
+}
+
+/// A point in object space, before it is placed in the world.
+struct LocalPoint {
+    position: DVec3,
+    /// Normal of the true surface, outward, of any length.
+    face: DVec3,
+    /// Interpolated normal, if there is one, of any length.
+    smooth: Option<DVec3>,
+    /// How far along the normal an intersection may be off.
+    error: f64,
+    place: Place,
 }
 
 impl SurfacePoint {
@@ -32,12 +54,11 @@ impl SurfacePoint {
     /// The hit was decided in f32; the point is solved again in f64 from the surface and the unrounded ray, so that
     /// its error does not depend on how far the ray has come.
     pub fn of(scene: &Scene, world: &World, ray: &ViewRay, hit: &Hit) -> Self {
-        let object = &scene.objects[hit.instance as usize];
         let instance = &world.instances[hit.instance as usize];
+        let material = scene.material_of(hit.instance, hit.primitive);
         match instance.shape {
             Shape::Mesh(mesh) => {
                 let mesh = &scene.meshes[mesh as usize];
-                let material = object.material.unwrap_or_else(|| mesh.material(hit.primitive));
                 let flat = scene.materials[material as usize].flat;
                 let corners = mesh.triangle(hit.primitive).map(|p| p.as_dvec3());
                 let weights = refined_weights(instance, ray, hit, corners);
@@ -55,29 +76,28 @@ impl SurfacePoint {
                     })
                 };
                 let error = test_error(position, weights, corners, face);
-                Self::placed(instance, ray, position, face, smooth, error, material)
+                let local = LocalPoint { position, face, smooth, error, place: Place::Weights(weights) };
+                Self::placed(instance, ray, local, material)
             }
             Shape::Quadric(quadric) => {
                 let quadric = &scene.quadrics[quadric as usize];
                 let (origin, direction) = instance.local_line(ray.origin, ray.direction);
                 let point = quadric.point(origin, direction, hit.primitive);
-                let material = object.material.unwrap_or(0);
-                Self::placed(instance, ray, point.position, point.normal, None, point.error, material)
+                let local = LocalPoint {
+                    position: point.position,
+                    face: point.normal,
+                    smooth: None,
+                    error: point.error,
+                    place: Place::Point(point.position),
+                };
+                Self::placed(instance, ray, local, material)
             }
         }
     }
 
-    /// Brings a point with its normals into the world; `error` bounds how far along the normal an intersection in
-    /// object space may be off.
-    fn placed(
-        instance: &Instance,
-        ray: &ViewRay,
-        position: DVec3,
-        face: DVec3,
-        smooth: Option<DVec3>,
-        error: f64,
-        material: u32,
-    ) -> Self {
+    /// Brings a point with its normals and error into the world.
+    fn placed(instance: &Instance, ray: &ViewRay, local: LocalPoint, material: u32) -> Self {
+        let LocalPoint { position, face, smooth, error, place } = local;
         let against = -ray.direction;
         let local_normal = normalize(face).unwrap_or(DVec3::ZERO);
         let (world, normal, smooth, magnitude, stretch) = if instance.identity {
@@ -101,7 +121,23 @@ impl SurfacePoint {
         let normal = smooth.and_then(normalize).unwrap_or(geometric_normal);
         let normal = if dot(normal, geometric_normal) < 0.0 { -normal } else { normal };
         let offset = error * stretch + dot(geometric_normal.abs(), magnitude);
-        Self { position: world, geometric_normal, normal, from_outside, material, offset }
+        Self { position: world, geometric_normal, normal, from_outside, material, offset, place }
+    }
+
+    /// Texture coordinates of this point, which `hit` found; the origin if its mesh has none.
+    pub fn texture_coordinates(&self, scene: &Scene, hit: &Hit) -> DVec2 {
+        match (scene.objects[hit.instance as usize].shape, self.place) {
+            (Shape::Mesh(mesh), Place::Weights([wa, wb, wc])) => {
+                let mesh = &scene.meshes[mesh as usize];
+                let Some(uvs) = &mesh.uvs else { return DVec2::ZERO };
+                let [a, b, c] = mesh.indices[hit.primitive as usize].map(|i| uvs[i as usize].as_dvec2());
+                a * wa + b * wb + c * wc
+            }
+            (Shape::Quadric(quadric), Place::Point(position)) => {
+                scene.quadrics[quadric as usize].uv(position, hit.primitive)
+            }
+            _ => unreachable!("the point is of another hit"),
+        }
     }
 
     /// Where a ray that leaves on the side of the incoming ray starts, rounded to f32 away from the surface.
@@ -171,24 +207,4 @@ fn refined_weights(instance: &Instance, ray: &ViewRay, hit: &Hit, [a, b, c]: [DV
     let u = u.clamp(0.0, 1.0);
     let v = v.clamp(0.0, 1.0 - u);
     [1.0 - u - v, u, v]
-}
-
-/// Texture coordinates of a hit point; the origin if its mesh has none.
-pub fn texture_coordinates(scene: &Scene, world: &World, ray: &ViewRay, hit: &Hit) -> DVec2 {
-    let instance = &world.instances[hit.instance as usize];
-    match instance.shape {
-        Shape::Mesh(mesh) => {
-            let mesh = &scene.meshes[mesh as usize];
-            let Some(uvs) = &mesh.uvs else { return DVec2::ZERO };
-            let corners = mesh.triangle(hit.primitive).map(|p| p.as_dvec3());
-            let weights = refined_weights(instance, ray, hit, corners);
-            let [a, b, c] = mesh.indices[hit.primitive as usize].map(|i| uvs[i as usize].as_dvec2());
-            a * weights[0] + b * weights[1] + c * weights[2]
-        }
-        Shape::Quadric(quadric) => {
-            let quadric = &scene.quadrics[quadric as usize];
-            let (origin, direction) = instance.local_line(ray.origin, ray.direction);
-            quadric.uv(quadric.point(origin, direction, hit.primitive).position, hit.primitive)
-        }
-    }
 }

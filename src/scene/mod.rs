@@ -91,6 +91,16 @@ impl Scene {
         &self.cameras[self.active_camera].camera
     }
 
+    /// The material at a hit, as a position in `materials`: the object's own, else the triangle's, else the first.
+    #[inline]
+    pub fn material_of(&self, instance: u32, primitive: u32) -> u32 {
+        let object = &self.objects[instance as usize];
+        object.material.unwrap_or_else(|| match object.shape {
+            Shape::Mesh(mesh) => self.meshes[mesh as usize].material(primitive),
+            Shape::Quadric(_) => 0,
+        })
+    }
+
     /// Which materials some object or triangle refers to, by position.
     pub fn used_materials(&self) -> Vec<bool> {
         let mut used = vec![false; self.materials.len()];
