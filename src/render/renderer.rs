@@ -73,7 +73,7 @@ impl Renderer {
     /// Builds the acceleration structures of a scene.
     ///
     /// # Errors
-    /// A singular transform, or a cancellation.
+    /// A singular transform, a light without direction, a material that makes light, or a cancellation.
     pub fn build(scene: Scene, params: &Params, progress: &dyn Progress) -> Result<Self> {
         let start = Instant::now();
         progress.begin("build", scene.meshes.iter().map(|mesh| mesh.live_count() as u64).sum());

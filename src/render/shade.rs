@@ -40,8 +40,8 @@ impl<I: Intersect> Tracer<'_, I> {
 
         // Ambient, then each light: diffuse and highlight.
         let mut color = colors.ambient;
-        for light in &self.scene.lights {
-            let Some(illumination) = Illumination::at(light, &point, self.scene.origin) else { continue };
+        for light in &self.world.lights {
+            let Some(illumination) = Illumination::at(light, &point) else { continue };
             let visible = self.visibility(&point, &illumination);
             if visible != Rgb::ZERO {
                 color += visible * illumination.color * direct(material, colors.diffuse, &point, view, &illumination);

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use crate::error::{Error, Result};
 use crate::geometry::{Key, Ray};
 use crate::math::float::{gamma, round_down};
 use crate::math::vector::{dot, length, normalize};
@@ -23,43 +24,92 @@ pub struct Illumination {
     pub position: Option<DVec3>,
 }
 
+/// A light relative to the scene's origin, with what does not depend on the point found once.
+#[derive(Debug, Clone, Copy)]
+pub struct PreparedLight {
+    color: DVec3,
+    source: Source,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Source {
+    /// Infinitely far away, in this unit direction.
+    Directional {
+        to_light: DVec3,
+    },
+    Point {
+        position: DVec3,
+        falloff: Falloff,
+    },
+    /// `axis` is the unit vector from the light along the cone; the angles are given by their cosines.
+    Spot {
+        position: DVec3,
+        axis: DVec3,
+        inner: f64,
+        outer: f64,
+        falloff: Falloff,
+    },
+}
+
+impl PreparedLight {
+    /// Prepares a light.
+    ///
+    /// # Errors
+    /// A direction that is zero or not finite.
+    pub fn new(light: &Light, scene_origin: DVec3) -> Result<Self> {
+        let unit = |direction: DVec3| {
+            normalize(direction).ok_or_else(|| Error::caller(format!("light `{}` has no direction", light.name)))
+        };
+        let source = match light.kind {
+            LightKind::Directional { direction } => Source::Directional { to_light: unit(-direction)? },
+            LightKind::Point { position, falloff } => Source::Point { position: position - scene_origin, falloff },
+            LightKind::Spot { position, direction, inner_angle, outer_angle, falloff } => Source::Spot {
+                position: position - scene_origin,
+                axis: unit(direction)?,
+                inner: libm::cos(inner_angle),
+                outer: libm::cos(outer_angle),
+                falloff,
+            },
+        };
+        Ok(Self { color: light.color.as_dvec3(), source })
+    }
+}
+
 impl Illumination {
     /// What `light` sends to a point; `None` where N.L is not positive, the light is at the point or its brightness
     /// there overflows, or the point lies outside its cone: then no shadow ray is traced.
-    pub fn at(light: &Light, point: &SurfacePoint, scene_origin: DVec3) -> Option<Self> {
-        let (to_light, strength, position) = match light.kind {
-            LightKind::Directional { direction } => (normalize(-direction)?, 1.0, None),
-            LightKind::Point { position, falloff } => {
-                let (to_light, strength, position) = from_point(position - scene_origin, falloff, point)?;
+    pub fn at(light: &PreparedLight, point: &SurfacePoint) -> Option<Self> {
+        let (to_light, strength, position) = match light.source {
+            Source::Directional { to_light } => (to_light, 1.0, None),
+            Source::Point { position, falloff } => {
+                let (to_light, strength) = from_point(position, falloff, point)?;
                 (to_light, strength, Some(position))
             }
-            LightKind::Spot { position, direction, inner_angle, outer_angle, falloff } => {
-                let (to_light, strength, position) = from_point(position - scene_origin, falloff, point)?;
-                let cosine = -dot(to_light, normalize(direction)?);
-                (to_light, strength * cone(cosine, inner_angle, outer_angle)?, Some(position))
+            Source::Spot { position, axis, inner, outer, falloff } => {
+                let (to_light, strength) = from_point(position, falloff, point)?;
+                (to_light, strength * cone(-dot(to_light, axis), inner, outer)?, Some(position))
             }
         };
         let n_dot_l = dot(point.normal, to_light);
         // Closer to an inverse-square light than f32 can tell there is no brightness to speak of.
-        let color = (light.color.as_dvec3() * strength).as_vec3();
+        let color = (light.color * strength).as_vec3();
         (n_dot_l > 0.0 && color.is_finite()).then_some(Self { to_light, n_dot_l, color, position })
     }
 }
 
-/// Direction, strength and place of a light at a point.
-fn from_point(position: DVec3, falloff: Falloff, point: &SurfacePoint) -> Option<(DVec3, f64, DVec3)> {
+/// Direction and strength of a light at a point.
+fn from_point(position: DVec3, falloff: Falloff, point: &SurfacePoint) -> Option<(DVec3, f64)> {
     let offset = position - point.position;
     let strength = match falloff {
         Falloff::None => 1.0,
         Falloff::InverseSquare => 1.0 / dot(offset, offset),
     };
-    Some((normalize(offset)?, strength, position))
+    Some((normalize(offset)?, strength))
 }
 
-/// The share of a spot's light at an angle to its axis, given by its cosine: glTF's KHR_lights_punctual, the square
-/// of a linear ramp in the cosine. `None` outside the cone.
-fn cone(cosine: f64, inner_angle: f64, outer_angle: f64) -> Option<f64> {
-    let (inner, outer) = (libm::cos(inner_angle), libm::cos(outer_angle));
+/// The share of a spot's light at an angle to its axis, all angles given by their cosines: glTF's
+/// KHR_lights_punctual, the square of a linear ramp in the cosine. `None` outside the cone.
+fn cone(cosine: f64, inner: f64, outer: f64) -> Option<f64> {
     if cosine >= inner {
         return Some(1.0);
     }

@@ -1,4 +1,5 @@
-//! The scene's objects made relative to its origin and ready for rays: transforms with inverses, world boxes.
+//! The scene's objects and lights made relative to its origin and ready for rays: transforms with inverses, world
+//! boxes.
 
 use glam::{DAffine3, DMat3, DVec3};
 
@@ -6,6 +7,7 @@ use crate::error::{Error, Result};
 use crate::geometry::ray::Interval;
 use crate::geometry::{Bounds, PreparedRay};
 use crate::math::Transform;
+use crate::render::shadow::PreparedLight;
 use crate::scene::{Scene, Shape};
 
 /// An object as rays meet it.
@@ -24,21 +26,23 @@ pub struct Instance {
     pub opaque: bool,
 }
 
-/// All objects of a scene, prepared.
+/// All objects and lights of a scene, prepared.
 #[derive(Debug, Clone)]
 pub struct World {
     /// The objects, in the scene's order.
     pub instances: Vec<Instance>,
     /// Whether no object lets light through: then a shadow ray is a yes or a no.
     pub all_opaque: bool,
+    /// The lights, in the scene's order.
+    pub lights: Vec<PreparedLight>,
 }
 
 impl World {
-    /// Prepares the objects of a scene.
+    /// Prepares the objects and lights of a scene.
     ///
     /// # Errors
-    /// Names the object whose transform is singular or not finite, or the material that returns more light than it
-    /// receives.
+    /// Names the object whose transform is singular or not finite, the material that returns more light than it
+    /// receives, or the light without direction.
     pub fn new(scene: &Scene) -> Result<Self> {
         // Weights that were computed may exceed 1 by rounding.
         const MOST: f32 = 1.0 + 4.0 * f32::EPSILON;
@@ -74,7 +78,8 @@ impl World {
         };
         let instances = scene.objects.iter().map(prepare).collect::<Result<Vec<_>>>()?;
         let all_opaque = instances.iter().all(|instance| instance.opaque);
-        Ok(Self { instances, all_opaque })
+        let lights = scene.lights.iter().map(|light| PreparedLight::new(light, scene.origin)).collect::<Result<_>>()?;
+        Ok(Self { instances, all_opaque, lights })
     }
 }
 
