@@ -38,9 +38,11 @@
 //! | [`accel`] | structures over triangles, and the tree over instances |
 //! | [`render`] | the seed's call graph: ray_tracing, trace, intersect, shade |
 //! | [`formats`] | OBJ, glTF and scene files in, pictures out |
+//! | `measure` | exact answers, the hard cases, speed against error, behind the feature `measure` |
 //! | `cli` | the command line, behind the feature `cli` |
 //!
-//! Imports go one way: `math, error, progress -> geometry -> {scene, accel} -> render -> formats -> cli`; a test reads
+//! Imports go one way: `math, error, progress -> geometry -> {scene, accel} -> render -> formats -> measure ->
+//! cli`; a test reads
 //! the source and fails on a backward one. `scene` and `accel` do not know each other and meet in
 //! [`render::intersect`]. Below `cli` nothing prints, reads arguments or exits.
 //!
@@ -65,6 +67,8 @@ pub mod formats;
 pub mod geometry;
 pub mod manual;
 pub mod math;
+#[cfg(feature = "measure")]
+pub mod measure;
 pub mod progress;
 pub mod render;
 pub mod scene;

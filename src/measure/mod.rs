@@ -1,0 +1,14 @@
+//! Answers that can be trusted: exact hits, numerically hard cases, speed against error, differences of pictures.
+//!
+//! Nothing here is on the renderer's path. What is measured is the renderer as users call it; what it is compared with
+//! does not share its formulas.
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`dyadic`] | exact numbers |
+//! | [`cases`] | the hard cases and what they count |
+//! | [`statistics`] | rates with their bounds, quantiles, medians with intervals |
+
+pub mod cases;
+pub mod dyadic;
+pub mod statistics;
