@@ -7,6 +7,7 @@ mod common;
 mod far_from_origin;
 mod golden;
 mod instances;
+mod metamorphic;
 mod models;
 mod shading;
 mod spawned_rays;
