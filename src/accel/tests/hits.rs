@@ -1,10 +1,13 @@
 //! Structures give the same hits as `linear`, bit for bit, on ordinary and on hard rays.
 
+use std::ops::ControlFlow;
+
 use glam::Vec3;
 
 use super::compare::{compare, compare_on_hard_rays, prepare, rays_at};
 use super::meshes::{Random, grid, random_soup, soup, sphere, transformed};
-use crate::accel::{Kind, Linear, Params, TriangleAccelerator, dispatch_kind};
+use crate::accel::triangle_tree::TriangleTree;
+use crate::accel::{Bvh2, CwBvh, Kind, Linear, Params, TriangleAccelerator, dispatch_kind};
 use crate::geometry::{Hit, PreparedRay, Ray, TriangleMesh};
 use crate::progress::Silent;
 
@@ -140,6 +143,35 @@ fn a_closed_sphere_has_no_leaks() {
     }
     assert!(hits.windows(2).all(|pair| pair[0] == pair[1]));
     compare("sphere", &ball, &prepared[..300]);
+}
+
+/// The leaves that a ray visits within `[near, far]`.
+fn leaves_visited<T: TriangleTree>(mesh: &TriangleMesh, ray: &PreparedRay, near: f32, far: f32) -> u32 {
+    let tree = <T as TriangleAccelerator>::build(mesh, &Params::default(), &Silent).unwrap();
+    let mut visited = 0;
+    let _ = tree.traverse(ray, near, far, |_| {
+        visited += 1;
+        ControlFlow::Continue(far)
+    });
+    visited
+}
+
+/// Both ends of the interval cull nodes: what lies before t_min costs as little as what lies beyond t_max.
+#[test]
+fn nodes_outside_the_interval_are_not_visited() {
+    fn check<T: TriangleTree>() {
+        let ball = sphere(16, 32);
+        // Through both walls, at t = 1 and 5; one wall's leaves lie within half a unit of it.
+        let ray = PreparedRay::new(&Ray::new(Vec3::new(-3.0, 0.1, 0.2), Vec3::X)).unwrap();
+        let visited = |near, far| leaves_visited::<T>(&ball, &ray, near, far);
+        let name = <T as TriangleTree>::NAME;
+        let all = visited(0.0, f32::INFINITY);
+        let (first, middle, second) = (visited(0.0, 2.0), visited(2.5, 3.5), visited(4.0, f32::INFINITY));
+        assert!(first > 0 && second > 0 && first + second <= all, "{name}: {first} + {second} of {all}");
+        assert_eq!((middle, visited(6.0, f32::INFINITY), visited(0.0, 0.5)), (0, 0, 0), "{name}");
+    }
+    check::<Bvh2>();
+    check::<CwBvh>();
 }
 
 #[test]
