@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::geometry::{Bounds, Hit, Key, PreparedRay, Quadric, Ray};
 use crate::progress::Progress;
 use crate::render::world::{Instance, World};
-use crate::scene::{Scene, Shape};
+use crate::scene::{Scene, Shape, compiled};
 
 /// Everything that a ray can ask of a scene. All implementations give the same answers, bit for bit.
 pub trait Intersect: Sync {
@@ -198,12 +198,13 @@ impl<A: TriangleAccelerator> TwoLevel<A> {
             return;
         }
         match instance.shape {
-            Shape::Mesh(mesh) if instance.identity => self.meet_mesh(mesh, number, ray, after, best),
+            Shape::Mesh(mesh) if instance.is_unmoved() => self.meet_mesh(mesh, number, ray, after, best),
             Shape::Mesh(mesh) => {
                 if let Some(local) = instance.local_ray(ray, clip) {
                     self.meet_mesh(mesh, number, &local, after, best);
                 }
             }
+            Shape::Quadric(_) if !compiled::QUADRICS => {}
             Shape::Quadric(quadric) => {
                 let (origin, direction) = instance.local_line(ray.origin.as_dvec3(), ray.direction.as_dvec3());
                 for crossing in self.quadrics[quadric as usize].intersect_quadratic(origin, direction).iter() {
@@ -259,10 +260,11 @@ impl<A: TriangleAccelerator> TwoLevel<A> {
             return false;
         }
         match instance.shape {
-            Shape::Mesh(mesh) if instance.identity => self.meshes[mesh as usize].occluded(ray),
+            Shape::Mesh(mesh) if instance.is_unmoved() => self.meshes[mesh as usize].occluded(ray),
             Shape::Mesh(mesh) => {
                 instance.local_ray(ray, clip).is_some_and(|local| self.meshes[mesh as usize].occluded(&local))
             }
+            Shape::Quadric(_) if !compiled::QUADRICS => false,
             Shape::Quadric(quadric) => {
                 let (origin, direction) = instance.local_line(ray.origin.as_dvec3(), ray.direction.as_dvec3());
                 self.quadrics[quadric as usize].intersect_quadratic(origin, direction).iter().any(|crossing| {

@@ -10,7 +10,7 @@ use crate::render::shadow::Illumination;
 use crate::render::surface::SurfacePoint;
 use crate::render::trace::{TracedRay, Tracer};
 use crate::scene::camera::ViewRay;
-use crate::scene::{Clamp, Material, Rgb};
+use crate::scene::{Clamp, Material, Rgb, compiled};
 
 /// A material's terms at a point, textures looked up.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,7 +40,8 @@ impl<I: Intersect> Tracer<'_, I> {
 
         // Ambient, then each light: diffuse and highlight.
         let mut color = colors.ambient;
-        for light in &self.world.lights {
+        let lights = &self.world.lights;
+        for light in if compiled::MANY_LIGHTS { lights } else { &lights[..1] } {
             let Some(illumination) = Illumination::at(light, &point) else { continue };
             let visible = self.visibility(&point, &illumination);
             if visible != Rgb::ZERO {
@@ -50,11 +51,11 @@ impl<I: Intersect> Tracer<'_, I> {
 
         // Mirror and transmission.
         if depth < self.scene.film.max_depth {
-            if material.is_reflective() {
+            if compiled::REFLECTION && material.is_reflective() {
                 self.count(|counts| counts.reflected += 1);
                 color += material.kr * self.trace(&reflected_ray(&point, view), depth + 1);
             }
-            if material.is_transmissive() {
+            if compiled::REFRACTION && material.is_transmissive() {
                 color += material.kt * self.trace(&self.transmitted_ray(&point, material, view), depth + 1);
             }
         }
@@ -69,11 +70,11 @@ impl<I: Intersect> Tracer<'_, I> {
     pub fn colors(&self, point: &SurfacePoint, hit: &Hit) -> SurfaceColors {
         let material = &self.scene.materials[point.material as usize];
         let texel = match material.diffuse_texture {
-            Some(reference) => {
+            Some(reference) if compiled::TEXTURES => {
                 let uv = point.texture_coordinates(self.scene, hit);
                 self.scene.textures[reference.texture as usize].sample(uv * reference.scale + reference.offset)
             }
-            None => Rgb::ONE,
+            _ => Rgb::ONE,
         };
         let diffuse = material.diffuse * texel;
         let ambient = material.ambient.unwrap_or(self.scene.ambient * diffuse);
@@ -97,7 +98,8 @@ impl<I: Intersect> Tracer<'_, I> {
 /// `(1 - kt) Od (N.L) + ks Os (R.V)^n` for one light.
 fn direct(material: &Material, diffuse: Rgb, point: &SurfacePoint, view: &ViewRay, illumination: &Illumination) -> Rgb {
     let n_dot_l = illumination.n_dot_l;
-    let mut sum = (Rgb::ONE - material.kt) * diffuse * (n_dot_l as f32);
+    let through = if compiled::REFRACTION { material.kt } else { Rgb::ZERO };
+    let mut sum = (Rgb::ONE - through) * diffuse * (n_dot_l as f32);
     if material.ks != Rgb::ZERO {
         let reflected = point.normal * (2.0 * n_dot_l) - illumination.to_light;
         let r_dot_v = -dot(reflected, view.direction);

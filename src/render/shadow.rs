@@ -9,7 +9,7 @@ use crate::math::vector::{dot, length, normalize};
 use crate::render::intersect::Intersect;
 use crate::render::surface::SurfacePoint;
 use crate::render::trace::{SPAWNED_T_MIN, Tracer};
-use crate::scene::{Falloff, Light, LightKind, Rgb};
+use crate::scene::{Falloff, Light, LightKind, Rgb, compiled};
 
 /// The light that would reach a point if nothing stood between.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -127,7 +127,7 @@ impl<I: Intersect> Tracer<'_, I> {
             return Rgb::ZERO;
         }
         let mut visible = Rgb::ONE;
-        if self.world.all_opaque {
+        if self.world.all_opaque || !compiled::REFRACTION {
             return visible;
         }
         let mut hit = self.intersect.next_transmissive_after(&ray, Key::BEFORE_ALL);

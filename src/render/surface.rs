@@ -7,7 +7,7 @@ use crate::math::float::{gamma, round_down, round_up};
 use crate::math::vector::{cross, dot, length, normalize};
 use crate::render::world::{Instance, World};
 use crate::scene::camera::ViewRay;
-use crate::scene::{Scene, Shape};
+use crate::scene::{Scene, Shape, compiled};
 
 /// A point on a surface, in the renderer's world.
 #[derive(Debug, Clone, Copy)]
@@ -66,7 +66,7 @@ impl SurfacePoint {
                 let [a, b, c] = corners;
                 let position = a * wa + b * wb + c * wc;
                 let face = cross(b - a, c - a);
-                let smooth = if flat {
+                let smooth = if flat || !compiled::NORMALS {
                     None
                 } else {
                     mesh.normals.as_ref().and_then(|normals| {
@@ -79,6 +79,7 @@ impl SurfacePoint {
                 let local = LocalPoint { position, face, smooth, error, place: Place::Weights(weights) };
                 Self::placed(instance, ray, local, material)
             }
+            Shape::Quadric(_) if !compiled::QUADRICS => unreachable!("this build has no quadrics"),
             Shape::Quadric(quadric) => {
                 let quadric = &scene.quadrics[quadric as usize];
                 let (origin, direction) = instance.local_line(ray.origin, ray.direction);
@@ -100,7 +101,7 @@ impl SurfacePoint {
         let LocalPoint { position, face, smooth, error, place } = local;
         let against = -ray.direction;
         let local_normal = normalize(face).unwrap_or(DVec3::ZERO);
-        let (world, normal, smooth, magnitude, stretch) = if instance.identity {
+        let (world, normal, smooth, magnitude, stretch) = if instance.is_unmoved() {
             (position, local_normal, smooth, position.abs() * gamma(1), 1.0)
         } else {
             let transform = &instance.transform;

@@ -8,7 +8,7 @@ use crate::geometry::ray::Interval;
 use crate::geometry::{Bounds, PreparedRay};
 use crate::math::Transform;
 use crate::render::shadow::PreparedLight;
-use crate::scene::{Scene, Shape};
+use crate::scene::{Scene, Shape, compiled};
 
 /// An object as rays meet it.
 #[derive(Debug, Clone)]
@@ -93,10 +93,16 @@ impl Instance {
         PreparedRay::local(origin.as_vec3(), direction.as_vec3(), ray, clip)
     }
 
+    /// Whether rays meet it as they are.
+    #[inline(always)]
+    pub fn is_unmoved(&self) -> bool {
+        self.identity || !compiled::TRANSFORMS
+    }
+
     /// Brings a world line into the object's space in f64.
     #[inline]
     pub fn local_line(&self, origin: DVec3, direction: DVec3) -> (DVec3, DVec3) {
-        if self.identity {
+        if self.is_unmoved() {
             (origin, direction)
         } else {
             (self.transform.point_to_object(origin), self.transform.vector_to_object(direction))

@@ -3,6 +3,7 @@
 pub mod auto;
 pub mod background;
 pub mod camera;
+pub mod compiled;
 pub mod exposure;
 pub mod extent;
 pub mod film;
