@@ -7,8 +7,10 @@
 //! |---|---|
 //! | [`dyadic`] | exact numbers |
 //! | [`cases`] | the hard cases and what they count |
+//! | [`features`] | what each feature of a scene costs it, present and absent |
 //! | [`statistics`] | rates with their bounds, quantiles, medians with intervals |
 
 pub mod cases;
 pub mod dyadic;
+pub mod features;
 pub mod statistics;
