@@ -14,13 +14,13 @@ use tempfile::TempDir;
 const MANUAL: &str = include_str!("../src/manual/command_line.md");
 
 /// A folder to run the program in.
-struct Workshop {
+pub struct Workshop {
     folder: TempDir,
 }
 
 impl Workshop {
     /// A folder with `model.obj`: a floor with a box and a slanted face on it, in two materials.
-    fn new() -> Self {
+    pub fn new() -> Self {
         let workshop = Self { folder: tempfile::tempdir().unwrap() };
         workshop.write(
             "model.obj",
@@ -37,15 +37,15 @@ impl Workshop {
         workshop
     }
 
-    fn path(&self, name: &str) -> PathBuf {
+    pub fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
 
-    fn write(&self, name: &str, text: &str) {
+    pub fn write(&self, name: &str, text: &str) {
         fs::write(self.path(name), text).unwrap();
     }
 
-    fn names(&self) -> BTreeSet<String> {
+    pub fn names(&self) -> BTreeSet<String> {
         fs::read_dir(self.folder.path())
             .unwrap()
             .map(|entry| entry.unwrap().file_name().into_string().unwrap())
@@ -53,25 +53,25 @@ impl Workshop {
     }
 
     /// The program with arguments separated by blanks, in this folder.
-    fn command(&self, arguments: &str) -> Command {
+    pub fn command(&self, arguments: &str) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_whitted"));
         command.args(arguments.split_whitespace()).current_dir(self.folder.path()).stdin(Stdio::null());
         command
     }
 
-    fn run(&self, arguments: &str) -> Output {
+    pub fn run(&self, arguments: &str) -> Output {
         self.command(arguments).output().unwrap()
     }
 
     /// Runs the program, which must succeed, and gives its standard output.
-    fn succeed(&self, arguments: &str) -> Vec<u8> {
+    pub fn succeed(&self, arguments: &str) -> Vec<u8> {
         let output = self.run(arguments);
         assert!(output.status.success(), "{arguments}: {}", text(&output.stderr));
         output.stdout
     }
 
     /// Runs the program, which must end with 1, silent on standard output, and gives its one line of standard error.
-    fn fail(&self, arguments: &str) -> String {
+    pub fn fail(&self, arguments: &str) -> String {
         let output = self.run(arguments);
         let stderr = text(&output.stderr);
         assert_eq!(output.status.code(), Some(1), "{arguments}: {stderr}");
@@ -82,12 +82,12 @@ impl Workshop {
     }
 
     /// The PNG that a rendering of the model with these flags streams.
-    fn png(&self, flags: &str) -> Vec<u8> {
+    pub fn png(&self, flags: &str) -> Vec<u8> {
         self.succeed(&format!("render model.obj -o - {flags}"))
     }
 }
 
-fn text(bytes: &[u8]) -> String {
+pub fn text(bytes: &[u8]) -> String {
     String::from_utf8(bytes.to_vec()).unwrap()
 }
 
@@ -102,7 +102,7 @@ fn keys(value: &Value) -> BTreeSet<String> {
 }
 
 /// The document has these keys, no others, and the manual names each.
-fn assert_documented(document: &Value, expected: &[&str]) {
+pub fn assert_documented(document: &Value, expected: &[&str]) {
     let expected: BTreeSet<String> = expected.iter().map(|key| key.to_string()).collect();
     assert_eq!(keys(document), expected);
     for key in &expected {

@@ -4,6 +4,7 @@ mod accelerators;
 mod architecture;
 mod command_line;
 mod common;
+mod diff;
 mod far_from_origin;
 mod golden;
 mod instances;

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueHint};
 use clap_complete::Shell;
 
+use super::diff::DiffArguments;
 use super::values::{self, Orbit, one_of};
 use crate::accel::{Kind, Params, Preset};
 use crate::formats::{LoadOptions, NormalMode, UpAxis};
@@ -32,6 +33,8 @@ pub enum Command {
     Render(Box<RenderArguments>),
     /// Tell what a scene or model holds and needs, without rendering it.
     Info(InfoArguments),
+    /// Tell how far two pictures are apart.
+    Diff(DiffArguments),
     /// Print a shell's completion script to standard output.
     Completions {
         /// The shell.

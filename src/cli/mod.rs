@@ -6,6 +6,7 @@
 pub mod arguments;
 mod camera;
 mod completions;
+mod diff;
 mod info;
 mod info_text;
 mod ledger;
@@ -35,6 +36,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     match &arguments.command {
         Command::Render(arguments) => render::run(arguments),
         Command::Info(arguments) => info::run(arguments),
+        Command::Diff(arguments) => diff::run(arguments),
         Command::Completions { shell } => completions::run(*shell),
     }
 }

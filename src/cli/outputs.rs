@@ -157,7 +157,7 @@ fn default_picture(input: &Path) -> Result<PathBuf> {
 }
 
 /// One name for every way to write a path, whether the file exists or not; `None` if its folder does not.
-fn identity(path: &Path) -> Option<PathBuf> {
+pub(super) fn identity(path: &Path) -> Option<PathBuf> {
     let in_folder = || {
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         Some(fs::canonicalize(folder).ok()?.join(path.file_name()?))

@@ -37,7 +37,12 @@ const LARGEST_TEXEL: f32 = 65504.0;
 /// Names the file and the cause: it cannot be read, is not an accepted format, is malformed, or is larger than 65536
 /// texels along a side or 2 GiB.
 pub fn read_texture(path: &Path) -> Result<Texture> {
-    let name = path.display().to_string();
+    let bytes = read_bytes(path)?;
+    decode_texture(&bytes, &path.display().to_string()).map_err(|error| error.at_path(path))
+}
+
+/// Reads an image file as it is, within the limit of size.
+pub(super) fn read_bytes(path: &Path) -> Result<Vec<u8>> {
     if path.is_dir() {
         return Err(Error::file("is a folder, not an image").at_path(path).remedy(ACCEPTED));
     }
@@ -48,7 +53,7 @@ pub fn read_texture(path: &Path) -> Result<Texture> {
     if bytes.len() as u64 > MOST_BYTES {
         return Err(Error::limit("image file of more than 2 GiB").at_path(path));
     }
-    decode_texture(&bytes, &name).map_err(|error| error.at_path(path))
+    Ok(bytes)
 }
 
 /// Decodes an image that is in memory; `name` is for messages, and its suffix tells TGA.
@@ -67,7 +72,7 @@ pub fn decode_texture(bytes: &[u8], name: &str) -> Result<Texture> {
 }
 
 /// The format by content, else by suffix.
-fn format_of(bytes: &[u8], name: &str) -> Result<ImageFormat> {
+pub(super) fn format_of(bytes: &[u8], name: &str) -> Result<ImageFormat> {
     use ImageFormat::{Bmp, Hdr, Jpeg, OpenExr, Png, Tga, WebP};
     match image::guess_format(bytes) {
         Ok(format @ (Png | Jpeg | WebP | Bmp | Hdr | OpenExr)) => Ok(format),
@@ -83,7 +88,8 @@ fn format_of(bytes: &[u8], name: &str) -> Result<ImageFormat> {
     }
 }
 
-fn decode_with_image(bytes: &[u8], format: ImageFormat) -> Result<(u32, u32, Texels)> {
+/// Decodes any format but EXR, within the limits of size.
+pub(super) fn decode_image(bytes: &[u8], format: ImageFormat) -> Result<DynamicImage> {
     let failed = |cause: ImageError| match cause {
         ImageError::Limits(_) => too_large(),
         ImageError::Unsupported(cause) => Error::unsupported(one_line(&cause.to_string())),
@@ -99,7 +105,12 @@ fn decode_with_image(bytes: &[u8], format: ImageFormat) -> Result<(u32, u32, Tex
     // Not every decoder heeds the limits.
     let (width, height) = decoder.dimensions();
     check_size(u64::from(width), u64::from(height), decoder.total_bytes())?;
-    let image = DynamicImage::from_decoder(decoder).map_err(failed)?;
+    DynamicImage::from_decoder(decoder).map_err(failed)
+}
+
+fn decode_with_image(bytes: &[u8], format: ImageFormat) -> Result<(u32, u32, Texels)> {
+    let image = decode_image(bytes, format)?;
+    let (width, height) = (image.width(), image.height());
     let texels = match image {
         DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => {
             let values = image.into_rgb32f().into_raw();
@@ -113,18 +124,27 @@ fn decode_with_image(bytes: &[u8], format: ImageFormat) -> Result<(u32, u32, Tex
     Ok((width, height, texels))
 }
 
-fn decode_exr(bytes: &[u8]) -> Result<(u32, u32, Texels)> {
-    let failed = |cause: exr::error::Error| match cause {
+/// What the EXR decoder says, as ours.
+pub(super) fn exr_failed(cause: exr::error::Error) -> Error {
+    match cause {
         exr::error::Error::NotSupported(what) => Error::unsupported(format!("EXR: {}", one_line(&what))),
         cause => Error::file(format!("cannot decode the EXR image: {}", one_line(&cause.to_string()))),
-    };
-    // The sizes in the header are checked before anything of that size is allocated.
-    let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(failed)?;
+    }
+}
+
+/// Checks the sizes in the headers of an EXR file, before anything of that size is allocated.
+pub(super) fn check_exr(bytes: &[u8]) -> Result<()> {
+    let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(exr_failed)?;
     for header in &meta.headers {
         let (width, height) = (header.layer_size.x() as u64, header.layer_size.y() as u64);
         let channels = header.channels.list.len() as u64;
         check_size(width, height, width.saturating_mul(height).saturating_mul(4 * channels))?;
     }
+    Ok(())
+}
+
+fn decode_exr(bytes: &[u8]) -> Result<(u32, u32, Texels)> {
+    check_exr(bytes)?;
     let image = exr::prelude::read()
         .no_deep_data()
         .largest_resolution_level()
@@ -137,7 +157,7 @@ fn decode_exr(bytes: &[u8]) -> Result<(u32, u32, Texels)> {
         .first_valid_layer()
         .all_attributes()
         .from_buffered(Cursor::new(bytes))
-        .map_err(failed)?;
+        .map_err(exr_failed)?;
     let size = image.layer_data.size;
     Ok((size.x() as u32, size.y() as u32, Texels::Linear32(image.layer_data.channel_data.pixels.1.into())))
 }

@@ -6,6 +6,7 @@
 mod layers;
 mod quantize;
 mod radiance;
+pub mod stored;
 
 use std::io::Write;
 use std::path::Path;
