@@ -167,6 +167,11 @@ impl Quadric {
         &self.coefficients
     }
 
+    /// The box that cuts the surface; [`Clip::NONE`] if none does.
+    pub fn clip(&self) -> &Clip {
+        &self.clip
+    }
+
     /// A box around the clipped surface in object space; `None` if it goes to infinity.
     pub fn bounds(&self) -> Option<Bounds> {
         self.bounds

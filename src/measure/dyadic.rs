@@ -7,7 +7,7 @@ use std::cmp::Ordering;
 use std::ops::{Add, Mul, Neg, Sub};
 
 use dashu_int::IBig;
-use dashu_int::ops::BitTest;
+use dashu_int::ops::{BitTest, SquareRoot, UnsignedAbs};
 
 /// `mantissa * 2^exponent`, exact.
 #[derive(Debug, Clone)]
@@ -56,6 +56,24 @@ impl Dyadic {
     /// The nearest f64, ties to even.
     pub fn to_f64(&self) -> f64 {
         quotient(self, &Self::new(1.0))
+    }
+
+    /// The length of the mantissa in bits; 0 for zero.
+    pub fn bits(&self) -> usize {
+        self.mantissa.bit_len()
+    }
+
+    /// The square root rounded down to `bits` bits or more.
+    ///
+    /// # Panics
+    /// If the number is negative.
+    pub fn square_root(&self, bits: usize) -> Self {
+        assert!(self.sign() != Ordering::Less, "the root of a negative number");
+        // Twice the bits under the root, and an even exponent.
+        let shift = (2 * bits).saturating_sub(self.bits()) as i64;
+        let shift = shift + (self.exponent - shift).rem_euclid(2);
+        let radicand = (&self.mantissa << shift as usize).unsigned_abs();
+        Self { mantissa: radicand.sqrt().into(), exponent: (self.exponent - shift) / 2 }
     }
 
     /// Both mantissas at the smaller of the exponents.
@@ -228,6 +246,18 @@ mod tests {
         let rest = &x * &x - Dyadic::new(1.0) - Dyadic::new(f64::EPSILON).scaled(1);
         assert_eq!(rest, Dyadic::new(1.0).scaled(-104));
         assert!(Dyadic::new(-1.0) < Dyadic::ZERO && Dyadic::new(0.1) > Dyadic::new(0.1f32.next_down().into()));
+    }
+
+    #[test]
+    fn square_roots_are_rounded_down_at_the_bits_asked_for() {
+        for (x, bits) in [(2.0, 10), (3.0, 200), (0.1, 64), (4.0, 5), (5e-324, 80), (1e300, 8), (0.0, 9)] {
+            let (x, root) = (Dyadic::new(x), Dyadic::new(x).square_root(bits));
+            assert!(&root * &root <= x);
+            // The next number of that many bits is too large.
+            let step = &root + &root.scaled(-(bits as i64) + 1);
+            assert!(&step * &step > x || x == Dyadic::ZERO, "{x:?}");
+        }
+        assert_eq!(Dyadic::new(6.25).square_root(3), Dyadic::new(2.5));
     }
 
     #[test]

@@ -9,11 +9,13 @@
 //! | [`cases`] | the hard cases and what they count |
 //! | [`features`] | what each feature of a scene costs it, present and absent |
 //! | [`picture_difference`], [`heatmap`] | how far two pictures are apart, and where |
+//! | [`oracle`] | exact hits |
 //! | [`statistics`] | rates with their bounds, quantiles, medians with intervals |
 
 pub mod cases;
 pub mod dyadic;
 pub mod features;
 pub mod heatmap;
+pub mod oracle;
 pub mod picture_difference;
 pub mod statistics;
