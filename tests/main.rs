@@ -7,6 +7,7 @@ mod common;
 mod diff;
 mod far_from_origin;
 mod golden;
+mod hard_cases;
 mod instances;
 mod metamorphic;
 mod models;

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueHint};
 use clap_complete::Shell;
 
+use super::check::CheckArguments;
 use super::diff::DiffArguments;
 use super::values::{self, Orbit, one_of};
 use crate::accel::{Kind, Params, Preset};
@@ -15,7 +16,7 @@ use crate::scene::film::{LARGEST_DEPTH, MOST_SAMPLES};
 use crate::scene::{Clamp, FilmSettings, Transfer};
 
 /// Far more threads than any machine has processors.
-const MOST_THREADS: u32 = 4096;
+pub const MOST_THREADS: u32 = 4096;
 
 /// Everything on the command line.
 #[derive(Debug, Parser)]
@@ -35,6 +36,8 @@ pub enum Command {
     Info(InfoArguments),
     /// Tell how far two pictures are apart.
     Diff(DiffArguments),
+    /// Ask the numerically hard cases, to know that this build is sound on this machine.
+    Check(CheckArguments),
     /// Print a shell's completion script to standard output.
     Completions {
         /// The shell.
@@ -185,7 +188,8 @@ fn aovs() -> impl Iterator<Item = (&'static str, AovKind)> {
     AovKind::ALL.into_iter().map(|kind| (kind.name(), kind))
 }
 
-fn accelerators() -> impl Iterator<Item = (&'static str, Kind)> {
+/// The structures by name, `auto` among them.
+pub fn accelerators() -> impl Iterator<Item = (&'static str, Kind)> {
     std::iter::once(&Kind::Auto).chain(Kind::ALL).map(|kind| (kind.name(), *kind))
 }
 

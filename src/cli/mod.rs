@@ -5,6 +5,8 @@
 
 pub mod arguments;
 mod camera;
+mod check;
+mod check_json;
 mod completions;
 mod diff;
 mod info;
@@ -37,6 +39,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         Command::Render(arguments) => render::run(arguments),
         Command::Info(arguments) => info::run(arguments),
         Command::Diff(arguments) => diff::run(arguments),
+        Command::Check(arguments) => check::run(arguments),
         Command::Completions { shell } => completions::run(*shell),
     }
 }

@@ -8,6 +8,10 @@ pub mod command_line {}
 #[doc = include_str!("conventions.md")]
 pub mod conventions {}
 
+/// The numerically hard cases: what each stands for, its truth and its bar.
+#[doc = include_str!("hard_cases.md")]
+pub mod hard_cases {}
+
 /// How materials of model files become terms of the shading formula.
 #[doc = include_str!("materials.md")]
 pub mod materials {}

@@ -6,6 +6,8 @@
 //! | module | holds |
 //! |---|---|
 //! | [`dyadic`] | exact numbers |
+//! | [`hexadecimal`] | numbers written exactly |
+//! | [`machine`] | what answers were computed on |
 //! | [`cases`] | the hard cases and what they count |
 //! | [`features`] | what each feature of a scene costs it, present and absent |
 //! | [`picture_difference`], [`heatmap`] | how far two pictures are apart, and where |
@@ -16,6 +18,8 @@ pub mod cases;
 pub mod dyadic;
 pub mod features;
 pub mod heatmap;
+pub mod hexadecimal;
+pub mod machine;
 pub mod oracle;
 pub mod picture_difference;
 pub mod statistics;

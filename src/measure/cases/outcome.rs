@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use crate::geometry::Ray;
+use crate::measure::cases::reduce::reduce;
 use crate::measure::statistics::rate_bound;
 
 /// What a case found: how many answers it checked, how many were wrong, and what it measured on the way.
@@ -41,6 +42,16 @@ pub struct Figure {
 }
 
 impl Failure {
+    /// A wrong answer to one ray.
+    pub fn of_ray(ray: &Ray, what: impl Into<String>) -> Self {
+        Self { ray: Some(*ray), triangle: None, what: what.into() }
+    }
+
+    /// A wrong answer that no single ray is to blame for.
+    pub fn text(what: impl Into<String>) -> Self {
+        Self { ray: None, triangle: None, what: what.into() }
+    }
+
     /// How much it takes to write the failure down: bits of all mantissas. Simpler failures are easier to understand.
     fn bits(&self) -> u32 {
         let length = |x: f32| 24 - (x.to_bits() & 0x7f_ffff | 0x80_0000).trailing_zeros();
@@ -93,6 +104,18 @@ impl Outcome {
     /// The upper end of the 95 % interval of the rate of wrong answers.
     pub fn bound(&self) -> f64 {
         rate_bound(self.wrong, self.rays)
+    }
+
+    /// Makes the kept failure simpler where it names a ray: `fails` says whether a simpler ray, and triangle if there is
+    /// one, is still answered wrongly.
+    pub fn simplify(mut self, fails: impl Fn(&Ray, Option<&[Vec3; 3]>) -> bool) -> Self {
+        if let Some(failure) = &mut self.failure
+            && let Some(ray) = failure.ray
+        {
+            let (ray, triangle) = reduce(ray, failure.triangle, fails);
+            (failure.ray, failure.triangle) = (Some(ray), triangle);
+        }
+        self
     }
 
     fn keep(&mut self, failure: Failure) {

@@ -1,0 +1,79 @@
+//! A scene in one kind of structure, and what it answers.
+
+use std::fmt;
+
+use crate::accel::{Kind, Params};
+use crate::error::Result;
+use crate::geometry::{Hit, Ray};
+use crate::progress::Progress;
+use crate::render::Renderer;
+use crate::scene::Scene;
+
+/// A scene built with one kind of structure and preset; displayed as `bvh2 fast`.
+pub struct Structure {
+    /// How it was built.
+    pub params: Params,
+    /// What rays are asked of.
+    pub renderer: Renderer,
+}
+
+/// What a structure says of a ray: its closest hit, and whether there is any.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Answer {
+    /// The closest hit.
+    pub hit: Hit,
+    /// Whether anything is hit.
+    pub occluded: bool,
+}
+
+impl Structure {
+    /// Builds a scene's structure.
+    ///
+    /// # Errors
+    /// A cancellation, or a build that was refused.
+    pub fn build(scene: &Scene, params: Params, progress: &dyn Progress) -> Result<Self> {
+        Ok(Self { params, renderer: Renderer::build(scene.clone(), &params, progress)? })
+    }
+
+    /// Asks for the closest hit and for any.
+    pub fn ask(&self, ray: &Ray) -> Answer {
+        Answer { hit: self.renderer.closest(ray), occluded: self.renderer.occluded(ray) }
+    }
+}
+
+impl Answer {
+    /// Both questions were answered with a hit.
+    pub fn is_hit(&self) -> bool {
+        self.hit.is_hit() && self.occluded
+    }
+
+    /// Both questions were answered with a miss.
+    pub fn is_miss(&self) -> bool {
+        !self.hit.is_hit() && !self.occluded
+    }
+}
+
+impl fmt::Display for Structure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.params.kind.resolve().name())?;
+        match self.params.kind.resolve() {
+            Kind::Linear => Ok(()),
+            _ => write!(f, " {}", format!("{:?}", self.params.preset).to_lowercase()),
+        }
+    }
+}
+
+impl fmt::Display for Answer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Hit { t, u, v, instance, primitive } = self.hit;
+        if self.hit.is_hit() {
+            write!(f, "a hit at t {t:?} on triangle {primitive} of object {instance}, u {u:?}, v {v:?}")?;
+        } else {
+            write!(f, "no hit")?;
+        }
+        if self.hit.is_hit() == self.occluded {
+            return Ok(());
+        }
+        write!(f, "; asked for any hit: {}", if self.occluded { "one" } else { "none" })
+    }
+}

@@ -1,0 +1,119 @@
+//! Closed and connected surfaces let nothing through: D1, D9.
+
+use glam::{DVec3, Vec3};
+
+use super::{Case, Context, Failure, Outcome, Rays, Structure, meshes};
+use crate::error::Result;
+use crate::geometry::{Ray, TriangleMesh};
+use crate::math::random::Random;
+
+/// The cases of this file.
+pub const CASES: &[Case] = &[
+    Case {
+        id: "D1",
+        title: "from inside a closed sphere, at vertices, at edges and anywhere",
+        bar: "0 misses in 1e8",
+        run: inside_a_sphere,
+    },
+    Case { id: "D9", title: "a flat grid under grazing and steep rays", bar: "0 misses in 1e7", run: flat_grid },
+];
+
+/// Where a model stands that was not moved to the origin: metres in a map's coordinates.
+const FAR: DVec3 = DVec3::new(148_376.0, 1_234.0, -223_423.0);
+
+/// Half of the rays at the origin, half of them far away, where the vertices are rounded to 1/64 and coarser.
+///
+/// 9024 triangles: 1e6 rays on `linear`, a hundredth, take about a minute on two cores.
+fn inside_a_sphere(context: &Context<'_>) -> Result<Outcome> {
+    const EACH: Rays = Rays { quick: 60_000, full: 50_000_000, linear: 100 };
+    let mut sum = Outcome::default();
+    for (place, center) in [(0, DVec3::ZERO), (1, FAR)] {
+        let scene = meshes::scene(vec![meshes::sphere(48, 96, 2.0, center)]);
+        let mesh = &scene.meshes[0];
+        sum = sum.and(context.ask_all(&scene, 0xd1 + place, EACH, |structure, random, number, outcome| {
+            let ray = outward_ray(mesh, center, random, number);
+            must_hit(structure, &ray, outcome);
+        })?);
+    }
+    Ok(sum)
+}
+
+/// A ray that starts within 1 of `center` per axis: at a vertex, at a point of an edge, at either along an axis, or
+/// anywhere; with a direction as long as the way or normalised.
+fn outward_ray(mesh: &TriangleMesh, center: DVec3, random: &mut Random, number: u64) -> Ray {
+    let origin = (center + random.in_cube()).as_vec3();
+    if number % 8 == 7 {
+        return Ray::new(origin, random.direction().as_vec3());
+    }
+    let target = if number.is_multiple_of(2) { any_vertex(mesh, random) } else { any_edge_point(mesh, random) };
+    let origin = match number % 8 {
+        // Along the axis of which the target is farthest: the ray meets the target exactly.
+        4 | 5 => {
+            let out = (target.as_dvec3() - center).abs();
+            let axis = (0..3).fold(0, |best, axis| if out[axis] > out[best] { axis } else { best });
+            let mut beside = target;
+            beside[axis] = origin[axis];
+            beside
+        }
+        _ => origin,
+    };
+    let way = target - origin;
+    let direction = if (number / 8).is_multiple_of(2) { way } else { super::unit(way) };
+    Ray::new(origin, direction)
+}
+
+fn any_vertex(mesh: &TriangleMesh, random: &mut Random) -> Vec3 {
+    mesh.positions[random.below(mesh.positions.len() as u64) as usize]
+}
+
+/// A point between two vertices that share a triangle, rounded.
+fn any_edge_point(mesh: &TriangleMesh, random: &mut Random) -> Vec3 {
+    let corners = mesh.indices[random.below(mesh.indices.len() as u64) as usize];
+    let first = random.below(3) as usize;
+    let [a, b] = [corners[first], corners[(first + 1) % 3]].map(|i| mesh.positions[i as usize].as_dvec3());
+    (a + (b - a) * random.unit()).as_vec3()
+}
+
+/// Counts a ray that must hit, asked for the closest hit and for any.
+fn must_hit(structure: &Structure, ray: &Ray, outcome: &mut Outcome) {
+    let answer = structure.ask(ray);
+    outcome.check(answer.is_hit(), || Failure::of_ray(ray, format!("{structure}: {answer}, where one is certain")));
+}
+
+/// From heights of 1e-6 to 1e6 above a grid of 100 x 100 quads to points on it, most of them on its edges and vertices,
+/// the grid lying across any axis.
+fn flat_grid(context: &Context<'_>) -> Result<Outcome> {
+    const EACH: Rays = Rays { quick: 12_000, full: 3_400_000, linear: 500 };
+    let mut sum = Outcome::default();
+    for axis in 0..3 {
+        // Turning the axes in a circle keeps the numbers of the vertices.
+        let to_world = |p: Vec3| match axis {
+            0 => p,
+            1 => Vec3::new(p.z, p.x, p.y),
+            _ => Vec3::new(p.y, p.z, p.x),
+        };
+        let scene = meshes::scene(vec![meshes::moved(&meshes::grid(100), to_world)]);
+        let mesh = &scene.meshes[0];
+        sum = sum.and(context.ask_all(&scene, 0xd9 + axis, EACH, |structure, random, number, outcome| {
+            // The rays are drawn over the plane z = 0 and turned with the grid.
+            let flat = |random: &mut Random, half: f64| {
+                to_world(Vec3::new(random.between(-half, half) as f32, random.between(-half, half) as f32, 0.0))
+            };
+            // Targets keep away from the border, so that rounding the direction cannot lead a ray over it.
+            let target = loop {
+                let target = match number % 3 {
+                    0 => any_vertex(mesh, random),
+                    1 => any_edge_point(mesh, random),
+                    _ => flat(random, 1.0),
+                };
+                if target.abs().max_element() <= 0.875 {
+                    break target;
+                }
+            };
+            let height = libm::pow(10.0, random.between(-6.0, 6.0)) * if random.bits() & 1 == 0 { 1.0 } else { -1.0 };
+            let origin = flat(random, 3.0) + to_world(Vec3::new(0.0, 0.0, height as f32));
+            must_hit(structure, &Ray::new(origin, target - origin), outcome);
+        })?);
+    }
+    Ok(sum)
+}
