@@ -13,7 +13,7 @@ use super::{info_text, ledger};
 use crate::error::{Error, Result};
 use crate::formats::{self, Ledger, Loaded, Treatment};
 use crate::geometry::TriangleMesh;
-use crate::geometry::mesh::{DroppedCounts, Materials};
+use crate::geometry::mesh::{DroppedCounts, Materials, Rounding};
 use crate::render::{BuildStats, Renderer};
 use crate::scene::extent::Extents;
 use crate::scene::needs::Needs;
@@ -41,6 +41,8 @@ pub struct Info<'a> {
     pub bounds: Option<BoundsInfo>,
     /// Where the renderer has its zero, in the file's coordinates.
     pub origin: [f64; 3],
+    /// What storing coordinates in f32 lost; null without meshes.
+    pub rounding: Option<RoundingInfo>,
     pub needs: Needs,
     pub bytes: Bytes,
     /// Geometry's bytes for each triangle in the meshes, dropped ones included; null without triangles.
@@ -81,6 +83,17 @@ pub struct LightInfo {
 pub struct BoundsInfo {
     pub min: [f64; 3],
     pub max: [f64; 3],
+}
+
+/// What storing coordinates in f32 lost, of the mesh where that is most for its finest edge; in its file's units.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RoundingInfo {
+    /// The mesh.
+    pub mesh: String,
+    /// The largest distance of a stored coordinate from the file's.
+    pub coordinate_loss: f64,
+    /// The shortest edge of a face in the file; null if there is none.
+    pub finest_edge: Option<f64>,
 }
 
 /// Bytes by part.
@@ -184,6 +197,7 @@ impl<'a> Info<'a> {
             film: scene.film,
             bounds: bounds(scene),
             origin: scene.origin.to_array(),
+            rounding: rounding(scene),
             needs: Needs::of(scene),
             bytes,
             bytes_per_triangle: bytes.per_triangle(all_triangles),
@@ -266,6 +280,14 @@ fn bounds(scene: &Scene) -> Option<BoundsInfo> {
     let (min, max) =
         corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), corner| (min.min(corner), max.max(corner)));
     min.cmple(max).all().then(|| BoundsInfo { min: min.to_array(), max: max.to_array() })
+}
+
+/// The mesh that lost most for its finest edge; of those that lost nothing, the first.
+fn rounding(scene: &Scene) -> Option<RoundingInfo> {
+    let share = |mesh: &TriangleMesh| mesh.rounding.largest_loss / mesh.rounding.finest_edge.unwrap_or(f64::INFINITY);
+    let worst = scene.meshes.iter().rev().max_by(|a, b| share(a).total_cmp(&share(b)))?;
+    let Rounding { largest_loss, finest_edge } = worst.rounding;
+    Some(RoundingInfo { mesh: worst.name.clone(), coordinate_loss: largest_loss, finest_edge })
 }
 
 /// The names of the materials in use.

@@ -72,6 +72,10 @@ fn place(table: &mut Table, info: &Info<'_>) {
         None => table.row("size", "nothing that has an end"),
     }
     table.row("scene origin", point(info.origin));
+    if let Some(rounding) = &info.rounding {
+        let edge = rounding.finest_edge.map_or("none".into(), |edge| format!("{:.3e}", edge));
+        table.row("coordinate loss", format!("{:.3e} at most; finest edge {edge}", rounding.coordinate_loss));
+    }
     let film = &info.film;
     table.row("picture", format!("{}x{}, {} samples a pixel", film.width, film.height, film.samples));
 }

@@ -7,6 +7,7 @@ pub mod ledger;
 pub mod model;
 pub mod obj;
 pub mod picture;
+mod rounding;
 pub mod scene_file;
 
 use std::io::Read as _;

@@ -34,6 +34,25 @@ pub struct TriangleMesh {
     pub dropped: Vec<u32>,
     /// Why they were dropped; filled by [`finish`](Self::finish).
     pub dropped_counts: DroppedCounts,
+    /// What storing the file's positions in f32 cost; filled by loaders.
+    pub rounding: Rounding,
+}
+
+/// What storing a file's positions in f32 cost, in the file's units.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Rounding {
+    /// The largest distance of a stored coordinate from the file's, over the vertices of faces.
+    pub largest_loss: f64,
+    /// The shortest edge of a face in the file; `None` if there is none. Edges that the file's own numbers cannot tell
+    /// from nothing do not count.
+    pub finest_edge: Option<f64>,
+}
+
+impl Rounding {
+    /// The loss where it is larger than the finest edge: detail is lost.
+    pub fn lost_detail(&self) -> Option<(f64, f64)> {
+        self.finest_edge.filter(|&edge| self.largest_loss > edge).map(|edge| (self.largest_loss, edge))
+    }
 }
 
 /// The materials of a mesh's triangles, as positions in the scene's list.

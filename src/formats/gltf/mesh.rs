@@ -3,7 +3,7 @@
 use ::gltf::json::mesh::{Mode, Primitive, Semantic};
 use ::gltf::json::validation::Checked;
 use ::gltf::json::{self, Index, Root};
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 
 use super::accessor::Accessor;
 use super::budget::Budget;
@@ -11,9 +11,10 @@ use super::buffers::Buffers;
 use super::document::missing_extension;
 use super::topology;
 use crate::error::{Error, Result};
-use crate::formats::{Ledger, NormalMode, Treatment};
+use crate::formats::{Ledger, NormalMode, Treatment, rounding};
 use crate::geometry::TriangleMesh;
-use crate::geometry::mesh::Materials;
+use crate::geometry::mesh::{Materials, Rounding};
+use crate::math::origin::choose_origin;
 
 /// What all meshes of a file are read with.
 pub(super) struct MeshReader<'a> {
@@ -183,12 +184,26 @@ impl Builder {
             self.uvs.resize(vertices, Vec2::ZERO);
             self.uvs
         });
-        let (positions, indices) = (self.positions, self.indices);
+        let (mut positions, indices) = (self.positions, self.indices);
+        let rounding = Rounding { largest_loss: 0.0, finest_edge: finest_edge(&positions, &indices) };
+        // The file has f32, and such numbers stay exact relative to any origin that is chosen.
+        let origin = choose_origin(positions.iter().map(|p| p.as_dvec3()));
+        if origin != DVec3::ZERO {
+            positions.iter_mut().for_each(|p| *p = (p.as_dvec3() - origin).as_vec3());
+        }
         let mut mesh =
-            TriangleMesh { name, positions, indices, normals, uvs, materials, ..Default::default() }.finish()?;
+            TriangleMesh { name, origin, positions, indices, normals, uvs, materials, rounding, ..Default::default() }
+                .finish()?;
         if mode == NormalMode::Smooth {
             mesh.compute_normals();
         }
         Ok(mesh)
     }
+}
+
+/// The shortest edge of the triangles.
+fn finest_edge(positions: &[Vec3], indices: &[[u32; 3]]) -> Option<f64> {
+    let point = |number: u32| positions.get(number as usize).map_or(DVec3::NAN, |p| p.as_dvec3());
+    let edges = indices.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]).map(|(a, b)| (point(a), point(b)));
+    rounding::finest_edge(edges, rounding::magnitude(positions.iter().map(|p| p.as_dvec3())))
 }

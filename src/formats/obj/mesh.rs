@@ -8,9 +8,9 @@ use glam::{DVec3, Vec2, Vec3};
 use super::parse::{ABSENT, Parsed};
 use super::triangulate::Triangulator;
 use crate::error::Result;
-use crate::formats::NormalMode;
+use crate::formats::{NormalMode, rounding};
 use crate::geometry::TriangleMesh;
-use crate::geometry::mesh::Materials;
+use crate::geometry::mesh::{Materials, Rounding};
 use crate::math::origin::choose_origin;
 use crate::progress::Progress;
 
@@ -32,7 +32,14 @@ pub(super) fn build(
         // Corners that differ in their normal alone are then one vertex.
         parsed.faces.normals = Vec::new();
     }
-    let origin = choose_origin(&parsed.positions);
+    let used = used_positions(&parsed);
+    let used_positions = || parsed.positions.iter().zip(&used).filter_map(|(&p, &used)| used.then_some(p));
+    let origin = choose_origin(used_positions());
+    let rounding = Rounding {
+        largest_loss: rounding::largest_loss(used_positions(), origin),
+        finest_edge: rounding::finest_edge(edges(&parsed), rounding::magnitude(used_positions())),
+    };
+    drop(used);
     let vertices = unify(&parsed, origin);
     let indices = cut(&parsed, vertices.of_corners.as_deref().unwrap_or(&parsed.faces.positions), progress)?;
     let (names, materials) = materials(&parsed);
@@ -45,6 +52,7 @@ pub(super) fn build(
         normals: file_normals,
         uvs,
         materials,
+        rounding,
         ..Default::default()
     };
     drop(parsed);
@@ -53,6 +61,30 @@ pub(super) fn build(
         mesh.compute_normals();
     }
     Ok((mesh, names))
+}
+
+/// Which positions some corner refers to. Others, such as a stray point at zero beside a model in map coordinates, must
+/// not decide where the origin is.
+fn used_positions(parsed: &Parsed) -> Vec<bool> {
+    let mut used = vec![false; parsed.positions.len()];
+    for &number in &parsed.faces.positions {
+        if let Some(used) = used.get_mut(number as usize) {
+            *used = true;
+        }
+    }
+    used
+}
+
+/// The ends of every face's edges; NaN where a corner's vertex is not in the file.
+fn edges(parsed: &Parsed) -> impl Iterator<Item = (DVec3, DVec3)> + '_ {
+    let mut start = 0;
+    parsed.faces.corner_counts().flat_map(move |count| {
+        let corners = &parsed.faces.positions[start..start + count];
+        start += count;
+        let point = |number: u32| parsed.positions.get(number as usize).copied().unwrap_or(DVec3::NAN);
+        let next = corners.iter().cycle().skip(1);
+        corners.iter().zip(next).map(move |(&a, &b)| (point(a), point(b)))
+    })
 }
 
 /// The mesh's vertices, and which of them each corner is.

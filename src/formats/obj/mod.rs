@@ -32,7 +32,7 @@ use std::io::BufReader;
 use std::path::Path;
 
 use crate::error::{Error, Result};
-use crate::formats::{Ledger, LoadOptions, Model, Treatment};
+use crate::formats::{Ledger, LoadOptions, Model, Treatment, rounding};
 use crate::progress::Progress;
 use crate::scene::{Material, Object, Shape};
 use library::Libraries;
@@ -64,6 +64,7 @@ pub fn load(path: &Path, options: &LoadOptions, progress: &dyn Progress) -> Resu
     let name = path.file_stem().map_or_else(|| "mesh".into(), |stem| stem.to_string_lossy());
     let (mesh, material_names) =
         mesh::build(parsed, &name, options.normals, progress).map_err(|error| error.at_path(path))?;
+    rounding::note(&mesh.rounding, &name, &mut ledger);
 
     let folder = path.parent().unwrap_or(Path::new(""));
     let libraries = Libraries::read(folder, &libraries, &mut ledger);
