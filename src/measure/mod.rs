@@ -12,6 +12,8 @@
 //! | [`features`] | what each feature of a scene costs it, present and absent |
 //! | [`picture_difference`], [`heatmap`] | how far two pictures are apart, and where |
 //! | [`oracle`] | exact hits |
+//! | [`scenes`] | small scenes with known answers |
+//! | [`light_paths`] | shadows and mirrors: acne, leaks, contact gaps, positions after bounces |
 //! | [`statistics`] | rates with their bounds, quantiles, medians with intervals |
 
 pub mod cases;
@@ -19,7 +21,9 @@ pub mod dyadic;
 pub mod features;
 pub mod heatmap;
 pub mod hexadecimal;
+pub mod light_paths;
 pub mod machine;
 pub mod oracle;
 pub mod picture_difference;
+pub mod scenes;
 pub mod statistics;

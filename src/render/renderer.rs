@@ -162,3 +162,27 @@ impl Renderer {
         with_structure!(&self.intersect, structure => structure.validate())
     }
 }
+
+/// What the call graph of [`render`](crate::render) needs, so that single rays can be traced and shaded outside of a
+/// picture: `Tracer::new(renderer.scene(), renderer.world(), &renderer)`.
+impl Intersect for Renderer {
+    fn closest(&self, ray: &Ray) -> Hit {
+        Self::closest(self, ray)
+    }
+
+    fn occluded(&self, ray: &Ray) -> bool {
+        Self::occluded(self, ray)
+    }
+
+    fn occluded_by_opaque(&self, ray: &Ray) -> bool {
+        with_structure!(&self.intersect, structure => structure.occluded_by_opaque(ray))
+    }
+
+    fn next_after(&self, ray: &Ray, key: Key) -> Hit {
+        Self::next_after(self, ray, key)
+    }
+
+    fn next_transmissive_after(&self, ray: &Ray, key: Key) -> Hit {
+        with_structure!(&self.intersect, structure => structure.next_transmissive_after(ray, key))
+    }
+}
