@@ -11,5 +11,6 @@ mod hard_cases;
 mod instances;
 mod metamorphic;
 mod models;
+mod query;
 mod shading;
 mod spawned_rays;

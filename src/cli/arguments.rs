@@ -7,6 +7,7 @@ use clap_complete::Shell;
 
 use super::check::CheckArguments;
 use super::diff::DiffArguments;
+use super::query::QueryArguments;
 use super::values::{self, Orbit, one_of};
 use crate::accel::{Kind, Params, Preset};
 use crate::formats::{LoadOptions, NormalMode, UpAxis};
@@ -38,6 +39,8 @@ pub enum Command {
     Diff(DiffArguments),
     /// Ask the numerically hard cases, to know that this build is sound on this machine.
     Check(CheckArguments),
+    /// Answer rays from a file: what each hits, and where.
+    Query(Box<QueryArguments>),
     /// Print a shell's completion script to standard output.
     Completions {
         /// The shell.
@@ -226,7 +229,7 @@ impl FilmArguments {
 impl LoadArguments {
     /// As the readers take them.
     pub fn options(&self) -> LoadOptions {
-        LoadOptions { normals: self.normals, up: self.up }
+        LoadOptions { normals: self.normals, up: self.up, ..LoadOptions::default() }
     }
 }
 

@@ -13,7 +13,9 @@ mod info;
 mod info_text;
 mod ledger;
 mod outputs;
+mod query;
 mod render;
+mod standard_input;
 mod stats_json;
 mod terminal;
 mod values;
@@ -40,6 +42,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         Command::Info(arguments) => info::run(arguments),
         Command::Diff(arguments) => diff::run(arguments),
         Command::Check(arguments) => check::run(arguments),
+        Command::Query(arguments) => query::run(arguments),
         Command::Completions { shell } => completions::run(*shell),
     }
 }

@@ -87,15 +87,8 @@ impl Outputs {
     /// # Errors
     /// Names the first output that is an input.
     pub fn refuse_inputs<'a>(&self, inputs: impl IntoIterator<Item = &'a Path>) -> Result<()> {
-        let inputs: Vec<PathBuf> = inputs.into_iter().filter_map(identity).collect();
-        for path in self.files().chain(self.partial.as_deref()) {
-            if identity(path).is_some_and(|path| inputs.contains(&path)) {
-                return Err(Error::caller("the picture is made from this file, so it is not overwritten")
-                    .at_path(path)
-                    .remedy("name another file to write"));
-            }
-        }
-        Ok(())
+        let inputs: Vec<&Path> = inputs.into_iter().collect();
+        self.files().chain(self.partial.as_deref()).try_for_each(|path| refuse_inputs(path, inputs.iter().copied()))
     }
 
     /// The files that a finished rendering writes.
@@ -134,6 +127,20 @@ impl Outputs {
         }
         Ok(())
     }
+}
+
+/// Refuses to write over any of the files that were read.
+///
+/// # Errors
+/// Names the output, if it is an input.
+pub(super) fn refuse_inputs<'a>(output: &Path, inputs: impl IntoIterator<Item = &'a Path>) -> Result<()> {
+    let Some(own) = identity(output) else { return Ok(()) };
+    if inputs.into_iter().filter_map(identity).any(|input| input == own) {
+        return Err(Error::caller("the output is made from this file, so it is not overwritten")
+            .at_path(output)
+            .remedy("name another file to write"));
+    }
+    Ok(())
 }
 
 /// Writes a text file whole or not at all.

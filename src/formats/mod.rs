@@ -64,6 +64,8 @@ pub struct LoadOptions {
     pub normals: NormalMode,
     /// The axis that points up.
     pub up: UpAxis,
+    /// Whether meshes keep which face of the file each triangle was cut from: 4 bytes a triangle.
+    pub faces: bool,
 }
 
 /// A scene and how its files were read.

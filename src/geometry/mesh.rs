@@ -30,6 +30,9 @@ pub struct TriangleMesh {
     pub uvs: Option<Vec<Vec2>>,
     /// Which of the scene's materials each triangle has.
     pub materials: Materials,
+    /// The 0-based face of the file that each triangle was cut from, where that was asked for and faces are not
+    /// triangles anyway; see [`source_face`](Self::source_face).
+    pub source_faces: Option<Vec<u32>>,
     /// Numbers of the triangles that cannot be hit, ascending; filled by [`finish`](Self::finish).
     pub dropped: Vec<u32>,
     /// Why they were dropped; filled by [`finish`](Self::finish).
@@ -211,6 +214,11 @@ impl TriangleMesh {
             Materials::One(material) => *material,
             Materials::PerTriangle(materials) => materials[number as usize],
         }
+    }
+
+    /// The 0-based face of the file that a triangle was cut from; its own number where that was not kept.
+    pub fn source_face(&self, number: u32) -> u32 {
+        self.source_faces.as_ref().map_or(number, |faces| faces[number as usize])
     }
 
     /// The box around the triangles that can be hit, relative to `origin`.

@@ -14,6 +14,7 @@
 //! | [`oracle`] | exact hits |
 //! | [`scenes`] | small scenes with known answers |
 //! | [`light_paths`] | shadows and mirrors: acne, leaks, contact gaps, positions after bounces |
+//! | [`ray_file`], [`hit_file`] | rays from files, answers to files |
 //! | [`statistics`] | rates with their bounds, quantiles, medians with intervals |
 
 pub mod cases;
@@ -21,9 +22,11 @@ pub mod dyadic;
 pub mod features;
 pub mod heatmap;
 pub mod hexadecimal;
+pub mod hit_file;
 pub mod light_paths;
 pub mod machine;
 pub mod oracle;
 pub mod picture_difference;
+pub mod ray_file;
 pub mod scenes;
 pub mod statistics;

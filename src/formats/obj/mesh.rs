@@ -8,7 +8,7 @@ use glam::{DVec3, Vec2, Vec3};
 use super::parse::{ABSENT, Parsed};
 use super::triangulate::Triangulator;
 use crate::error::Result;
-use crate::formats::{NormalMode, rounding};
+use crate::formats::{LoadOptions, NormalMode, rounding};
 use crate::geometry::TriangleMesh;
 use crate::geometry::mesh::{Materials, Rounding};
 use crate::math::origin::choose_origin;
@@ -25,9 +25,10 @@ const FACES_PER_CHECK: usize = 1 << 16;
 pub(super) fn build(
     mut parsed: Parsed,
     name: &str,
-    normals: NormalMode,
+    options: &LoadOptions,
     progress: &dyn Progress,
 ) -> Result<(TriangleMesh, Vec<Option<String>>)> {
+    let normals = options.normals;
     if normals != NormalMode::File {
         // Corners that differ in their normal alone are then one vertex.
         parsed.faces.normals = Vec::new();
@@ -53,6 +54,7 @@ pub(super) fn build(
         uvs,
         materials,
         rounding,
+        source_faces: options.faces.then(|| source_faces(&parsed)),
         ..Default::default()
     };
     drop(parsed);
@@ -157,6 +159,12 @@ fn cut(parsed: &Parsed, vertices: &[u32], progress: &dyn Progress) -> Result<Vec
         start += corners;
     }
     Ok(triangles)
+}
+
+/// The face that each triangle was cut from, numbered from 0 in the order of the file.
+fn source_faces(parsed: &Parsed) -> Vec<u32> {
+    let faces = parsed.faces.numbers_in_file().zip(parsed.faces.corner_counts());
+    faces.flat_map(|(face, corners)| repeat_n(face as u32, corners - 2)).collect()
 }
 
 /// The names of the materials that faces use, and which each triangle has.

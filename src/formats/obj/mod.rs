@@ -62,8 +62,7 @@ pub fn load(path: &Path, options: &LoadOptions, progress: &dyn Progress) -> Resu
     }
     let libraries = std::mem::take(&mut parsed.libraries);
     let name = path.file_stem().map_or_else(|| "mesh".into(), |stem| stem.to_string_lossy());
-    let (mesh, material_names) =
-        mesh::build(parsed, &name, options.normals, progress).map_err(|error| error.at_path(path))?;
+    let (mesh, material_names) = mesh::build(parsed, &name, options, progress).map_err(|error| error.at_path(path))?;
     rounding::note(&mesh.rounding, &name, &mut ledger);
 
     let folder = path.parent().unwrap_or(Path::new(""));

@@ -61,12 +61,23 @@ pub(super) struct Faces {
     pub normals: Vec<u32>,
     /// Corners of each face; empty while all are triangles.
     corner_counts: Vec<u32>,
+    /// For each face that was left out, how many of those that were kept come before it.
+    left_out: Vec<usize>,
 }
 
 impl Faces {
     /// How many corners each face has.
     pub fn corner_counts(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.count).map(|face| self.corner_counts.get(face).map_or(3, |&count| count as usize))
+    }
+
+    /// For each face the number that it has among all of the file's, those that were left out among them; from 0.
+    pub fn numbers_in_file(&self) -> impl Iterator<Item = usize> + '_ {
+        let mut before = 0;
+        (0..self.count).map(move |face| {
+            before += self.left_out[before..].iter().take_while(|&&kept| kept <= face).count();
+            face + before
+        })
     }
 
     /// The number of triangles: a face of n corners gives n - 2.
@@ -154,6 +165,7 @@ impl Parsed {
         }
         if self.faces.positions.len() - start < 3 {
             self.counts.small_faces += 1;
+            self.faces.left_out.push(self.faces.count);
             self.faces.positions.truncate(start);
             self.faces.uvs.truncate(start);
             self.faces.normals.truncate(start);

@@ -113,6 +113,18 @@ fn normals_follow_the_option() {
 }
 
 #[test]
+fn source_faces_are_kept_when_asked_for() {
+    // A square, a line that is no face, a pentagon and a triangle.
+    let text = format!("{SQUARE}v 0.5 2 0\nf 1 2 3 4\nf 1 2\nf 1 2 3 5 4\nf 1 2 3\n");
+    let faces = |faces| {
+        let model = load_files(&[("a.obj", &text)], &LoadOptions { faces, ..Default::default() }).unwrap();
+        model.meshes[0].source_faces.clone()
+    };
+    assert_eq!(faces(true), Some(vec![0, 0, 2, 2, 2, 3]));
+    assert_eq!(faces(false), None);
+}
+
+#[test]
 fn z_up_models_are_turned_exactly() {
     let text = format!("{SQUARE}f 1 2 3");
     let model = load_files(&[("a.obj", &text)], &LoadOptions { up: UpAxis::Z, ..Default::default() }).unwrap();

@@ -452,7 +452,7 @@ fn a_mistake_in_a_model_is_told_by_its_own_line() {
 fn a_saved_scene_reads_back_to_the_bit() {
     let folder = folder_with("");
     let model = folder.path().join("m.obj");
-    let options = LoadOptions { normals: NormalMode::Smooth, up: UpAxis::Z };
+    let options = LoadOptions { normals: NormalMode::Smooth, up: UpAxis::Z, ..LoadOptions::default() };
     let mut scene = formats::open(&model, &options, &Silent).unwrap().scene;
     // Values that short digits cannot hold, and names that repeat.
     let projection = Projection::Orthographic { height: 0.1 + 0.2 };
