@@ -33,6 +33,9 @@ pub use bvh2::Bvh2;
 pub use cwbvh::CwBvh;
 pub use linear::Linear;
 pub use stats::TreeStats;
+/// For `measure`, which compares formulas within one and the same tree.
+#[cfg(feature = "measure")]
+pub(crate) use topology::{Node, Topology};
 
 use crate::error::Result;
 use crate::geometry::{Bounds, Hit, Key, PreparedRay, TriangleMesh};

@@ -15,6 +15,10 @@
 //! | [`scenes`] | small scenes with known answers |
 //! | [`light_paths`] | shadows and mirrors: acne, leaks, contact gaps, positions after bounces |
 //! | [`ray_file`], [`hit_file`] | rays from files, answers to files |
+//! | [`variants`] | other ways to do what the renderer does, from their publications |
+//! | [`speed`], [`sweep`] | interleaved timing; rates with intervals, and what is dominated |
+//! | [`table`], [`plot`] | Markdown tables; scatter plots as SVG |
+//! | [`report`] | speed against error, as `whitted report` writes it |
 //! | [`statistics`] | rates with their bounds, quantiles, medians with intervals |
 
 pub mod cases;
@@ -27,6 +31,12 @@ pub mod light_paths;
 pub mod machine;
 pub mod oracle;
 pub mod picture_difference;
+pub mod plot;
 pub mod ray_file;
+pub mod report;
 pub mod scenes;
+pub mod speed;
 pub mod statistics;
+pub mod sweep;
+pub mod table;
+pub mod variants;

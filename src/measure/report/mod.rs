@@ -1,0 +1,183 @@
+//! Speed against error, on a scene's triangles: what `whitted report` measures and writes.
+//!
+//! ```text
+//! subject -> rays -> choices -> ask (exact answers, answers, speeds) -> judge -> rows -> Markdown, JSON, SVG
+//! ```
+//!
+//! Bars and rules are fixed before anything is measured: one configuration for all scenes; a speed has its error
+//! beside it; every case is printed; what is dominated stays.
+
+pub mod accuracy;
+pub mod choices;
+mod document;
+pub mod environment;
+pub mod judge;
+mod pictures;
+pub mod query;
+pub mod ray_set;
+pub mod rays;
+pub mod subject;
+
+use crate::accel::Params;
+use crate::error::Result;
+use crate::measure::oracle::Oracle;
+use crate::progress::Progress;
+use crate::render::Renderer;
+
+use accuracy::{Accuracy, AccuracyRow};
+use environment::Environment;
+use judge::Judge;
+use query::{Effort, QueryRow};
+use ray_set::{Group, Question, RaySet};
+use rays::RayKind;
+use subject::Subject;
+
+/// The `schema` of the JSON: raised when a reader would break.
+pub const SCHEMA: u32 = 1;
+
+/// What to measure.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Options {
+    /// Which rays to make.
+    pub kinds: Vec<RayKind>,
+    /// How many of each kind.
+    pub rays: usize,
+    /// How many of them are timed, and how often.
+    pub effort: Effort,
+}
+
+/// Everything that was measured.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Report {
+    /// [`SCHEMA`].
+    pub schema: u32,
+    /// Whether everything that was asked for is there.
+    pub complete: bool,
+    /// What it was measured on.
+    pub environment: Environment,
+    /// Rays of each kind that were judged.
+    pub rays: usize,
+    /// Rays of each kind that were timed.
+    pub rays_timed: usize,
+    /// How often they were timed.
+    pub repetitions: u32,
+    /// The parts, one a scene.
+    pub subjects: Vec<SubjectReport>,
+}
+
+/// What was measured on one scene.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct SubjectReport {
+    /// What the scene is called.
+    pub name: String,
+    /// Triangles, instances counted.
+    pub triangles: usize,
+    /// Quadrics of the scene, which the query and accuracy planes leave out.
+    pub quadrics_left_out: usize,
+    /// The sets of rays.
+    pub ray_sets: Vec<RaySetReport>,
+    /// The query plane: a row a set and choice.
+    pub query: Vec<QueryRow>,
+    /// The accuracy plane: a row a choice and group.
+    pub accuracy: Vec<AccuracyRow>,
+}
+
+/// What a set of rays is.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct RaySetReport {
+    /// What kind of rays.
+    pub ray_kind: String,
+    /// Whether they are aimed at what is hard.
+    pub group: Group,
+    /// What is asked of them.
+    pub question: Question,
+    /// How many.
+    pub rays: usize,
+    /// How many of them hit something, exactly.
+    pub exact_hits: usize,
+    /// Fingerprint of the rays.
+    pub ray_set_hash: String,
+}
+
+/// A file of a report.
+#[derive(Debug, Clone, PartialEq)]
+pub struct File {
+    /// Its name within the report's folder.
+    pub name: String,
+    /// What is in it.
+    pub text: String,
+}
+
+impl Report {
+    /// A report with nothing in it yet.
+    pub fn new(environment: Environment, options: &Options) -> Self {
+        let Effort { rays_timed, repetitions } = options.effort;
+        Self {
+            schema: SCHEMA,
+            complete: false,
+            environment,
+            rays: options.rays,
+            rays_timed: rays_timed.min(options.rays),
+            repetitions,
+            subjects: Vec::new(),
+        }
+    }
+
+    /// The report as JSON.
+    pub fn json(&self) -> String {
+        serde_json::to_string_pretty(self).expect("names and numbers have a JSON form") + "\n"
+    }
+
+    /// All files of the report: Markdown, JSON, and the pictures that the Markdown shows.
+    pub fn files(&self) -> Vec<File> {
+        let mut files = pictures::all(self);
+        let markdown = document::markdown(self, &files);
+        files.push(File { name: "report.json".into(), text: self.json() });
+        files.push(File { name: "report.md".into(), text: markdown });
+        files
+    }
+}
+
+/// Measures one scene; `given` are further sets of rays in the coordinates of its triangles.
+///
+/// # Errors
+/// A cancellation, a degenerate camera, or a limit.
+pub fn measure(
+    subject: &Subject,
+    given: &[RaySet],
+    options: &Options,
+    progress: &dyn Progress,
+) -> Result<SubjectReport> {
+    let mesh = subject.mesh();
+    let oracle = Oracle::new(&subject.scene)?;
+    let judge = Judge::new(mesh, &oracle);
+    let (skeleton, seconds) = choices::skeleton(&subject.scene, progress)?;
+    let choices = choices::all(&subject.scene, &skeleton, seconds, progress)?;
+    let renderer = Renderer::build(subject.scene.clone(), &Params::default(), progress)?;
+
+    let mut report = SubjectReport {
+        name: subject.name.clone(),
+        triangles: mesh.live_count(),
+        quadrics_left_out: subject.quadrics,
+        ray_sets: Vec::new(),
+        query: Vec::new(),
+        accuracy: Vec::new(),
+    };
+    let mut accuracy = Accuracy::new(mesh, &judge, choices.len());
+    let made = options.kinds.iter().map(|kind| kind.rays(&renderer, options.rays)).collect::<Result<Vec<_>>>()?;
+    for set in made.iter().chain(given).filter(|set| !set.rays.is_empty()) {
+        let asked = query::ask(&choices, set, &judge, options.effort, progress)?;
+        report.query.extend(query::rows(&choices, &asked, &judge, progress)?);
+        accuracy.add(&asked);
+        report.ray_sets.push(RaySetReport {
+            ray_kind: set.name.clone(),
+            group: set.group,
+            question: set.question,
+            rays: set.rays.len(),
+            exact_hits: asked.truths.iter().flatten().count(),
+            ray_set_hash: set.hash(),
+        });
+    }
+    report.accuracy = accuracy.rows(&choices, &report.query);
+    Ok(report)
+}

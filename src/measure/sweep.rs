@@ -1,0 +1,92 @@
+//! Speed against error: what a row of a sweep says, and which rows are dominated.
+
+use crate::measure::statistics::{Median, rate_interval};
+
+/// A counted error with its exact 95 % interval (Clopper and Pearson 1934).
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Rate {
+    /// Answers that are wrong.
+    pub wrong: u64,
+    /// Answers checked.
+    pub total: u64,
+    /// Wrong answers in 1e9.
+    pub per_1e9: f64,
+    /// Lower end of the interval, in 1e9.
+    pub low: f64,
+    /// Upper end of the interval, in 1e9.
+    pub high: f64,
+}
+
+impl Rate {
+    /// The rate of `wrong` in `total`.
+    pub fn new(wrong: u64, total: u64) -> Self {
+        let (low, high) = rate_interval(wrong, total);
+        let per_1e9 = if total == 0 { f64::NAN } else { wrong as f64 / total as f64 * 1e9 };
+        Self { wrong, total, per_1e9, low: low * 1e9, high: high * 1e9 }
+    }
+}
+
+impl std::fmt::Display for Rate {
+    /// `1.2e5 (0.9e5 to 1.6e5; 12 of 100000)`, or `0 (below 3.7e4; 0 of 100000)`.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { wrong, total, per_1e9, low, high } = *self;
+        if total == 0 {
+            write!(f, "not measured")
+        } else if wrong == 0 {
+            write!(f, "0 (below {high:.1e}; 0 of {total})")
+        } else {
+            write!(f, "{per_1e9:.1e} ({low:.1e} to {high:.1e}; {wrong} of {total})")
+        }
+    }
+}
+
+/// What one choice costs and what it gets wrong: two numbers that are never made one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cost {
+    /// Larger is better.
+    pub speed: Median,
+    /// Smaller is better.
+    pub error: f64,
+}
+
+/// Which choices are dominated: another one is no worse in both and better in one.
+///
+/// Speeds whose intervals overlap are equal, so that noise dominates nobody. NaN errors dominate nothing and are
+/// dominated by every other choice that is no slower.
+pub fn dominated(costs: &[Cost]) -> Vec<bool> {
+    let faster = |a: &Cost, b: &Cost| a.speed.low > b.speed.high;
+    let beats = |a: &Cost, b: &Cost| {
+        let more_right = a.error < b.error || (b.error.is_nan() && !a.error.is_nan());
+        let no_less_right = more_right || a.error == b.error;
+        no_less_right && !faster(b, a) && (more_right || faster(a, b))
+    };
+    costs.iter().map(|own| costs.iter().any(|other| beats(other, own))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cost(speed: f64, error: f64) -> Cost {
+        Cost { speed: Median { value: speed, low: speed * 0.95, high: speed * 1.05 }, error }
+    }
+
+    #[test]
+    fn slower_and_less_right_is_dominated() {
+        let costs = [cost(4.0, 9.0), cost(2.0, 0.0), cost(1.0, 0.0), cost(2.05, 5.0), cost(3.0, f64::NAN)];
+        assert_eq!(dominated(&costs), [false, false, true, true, true]);
+    }
+
+    #[test]
+    fn equal_choices_do_not_dominate_each_other() {
+        assert_eq!(dominated(&[cost(2.0, 1.0), cost(2.01, 1.0)]), [false, false]);
+        assert_eq!(dominated(&[]), [] as [bool; 0]);
+    }
+
+    #[test]
+    fn rates_print_what_they_were_counted_from() {
+        assert_eq!(Rate::new(0, 100_000).to_string(), "0 (below 3.7e4; 0 of 100000)");
+        assert_eq!(Rate::new(0, 0).to_string(), "not measured");
+        assert_eq!(Rate::new(2, 10).to_string(), "2.0e8 (2.5e7 to 5.6e8; 2 of 10)");
+    }
+}
