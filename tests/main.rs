@@ -12,5 +12,6 @@ mod instances;
 mod metamorphic;
 mod models;
 mod query;
+mod report;
 mod shading;
 mod spawned_rays;

@@ -8,6 +8,7 @@ use clap_complete::Shell;
 use super::check::CheckArguments;
 use super::diff::DiffArguments;
 use super::query::QueryArguments;
+use super::report::ReportArguments;
 use super::values::{self, Orbit, one_of};
 use crate::accel::{Kind, Params, Preset};
 use crate::formats::{LoadOptions, NormalMode, UpAxis};
@@ -41,6 +42,8 @@ pub enum Command {
     Check(CheckArguments),
     /// Answer rays from a file: what each hits, and where.
     Query(Box<QueryArguments>),
+    /// Measure speed against error on models, scenes or built-in hard meshes, as tables and plots.
+    Report(ReportArguments),
     /// Print a shell's completion script to standard output.
     Completions {
         /// The shell.

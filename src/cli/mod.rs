@@ -15,6 +15,7 @@ mod ledger;
 mod outputs;
 mod query;
 mod render;
+mod report;
 mod standard_input;
 mod stats_json;
 mod terminal;
@@ -43,6 +44,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         Command::Diff(arguments) => diff::run(arguments),
         Command::Check(arguments) => check::run(arguments),
         Command::Query(arguments) => query::run(arguments),
+        Command::Report(arguments) => report::run(arguments),
         Command::Completions { shell } => completions::run(*shell),
     }
 }

@@ -16,6 +16,10 @@ pub mod hard_cases {}
 #[doc = include_str!("materials.md")]
 pub mod materials {}
 
+/// How to read what `whitted report` measures.
+#[doc = include_str!("report.md")]
+pub mod report {}
+
 /// The scene file, section by section.
 #[doc = include_str!("scene_format.md")]
 pub mod scene_format {}

@@ -1,0 +1,203 @@
+//! `whitted report`.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use clap::{Args, ValueHint};
+
+use super::terminal::{self, Terminal};
+use super::values::{self, one_of};
+use super::{arguments, ledger};
+use crate::error::{Error, Fault, Result};
+use crate::formats::atomic_file::{check_writable, write_atomically};
+use crate::formats::{self, Loaded};
+use crate::measure::report::environment::Environment;
+use crate::measure::report::query::Effort;
+use crate::measure::report::rays::{RayKind, SEED};
+use crate::measure::report::subject::{HardSet, Subject};
+use crate::measure::report::{self, Options, Report};
+use crate::measure::speed::FEWEST_REPETITIONS;
+
+/// Flags of `report`.
+#[derive(Debug, Args)]
+pub struct ReportArguments {
+    /// Scene files or models, each a part of the report.
+    #[arg(value_hint = ValueHint::FilePath, required_unless_present = "hard_set")]
+    pub input: Vec<PathBuf>,
+    /// Built-in meshes that are made to be hard, with commas between; parts of the report after the inputs.
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = one_of(hard_sets()))]
+    pub hard_set: Vec<HardSet>,
+    /// Folder to write report.md, report.json and the plots to; made if it is not there.
+    /// Without it: `report-` and the name of the first part, in the current folder.
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
+    pub out: Option<PathBuf>,
+    /// Print the report as one JSON document and write no files, unless --out is given.
+    #[arg(long)]
+    pub json: bool,
+    /// Rays to make, with commas between; all kinds if it is not given.
+    #[arg(long, value_name = "KINDS", value_delimiter = ',', value_parser = one_of(ray_kinds()))]
+    pub ray_kinds: Vec<RayKind>,
+    /// Rays of each kind whose answers are judged; the smallest rate that can be told from 0 is about 3 over this.
+    #[arg(long, value_name = "N", value_parser = values::count(1..=MOST_RAYS), default_value_t = 50_000)]
+    pub rays: u32,
+    /// Rays of each kind that are timed.
+    #[arg(long, value_name = "N", value_parser = values::count(1..=MOST_RAYS), default_value_t = 10_000)]
+    pub timed_rays: u32,
+    /// How often each choice is timed: 10 at least, or 0 for errors without speeds.
+    #[arg(long, value_name = "N", value_parser = repetitions, default_value_t = FEWEST_REPETITIONS)]
+    pub repeat: u32,
+    /// Threads that find exact answers; 0 is one per processor. Speed is always that of one thread.
+    #[arg(long, value_name = "N", value_parser = values::count(0..=arguments::MOST_THREADS), default_value_t = 0)]
+    pub threads: u32,
+    /// How the inputs are read.
+    #[command(flatten)]
+    pub load: arguments::LoadArguments,
+}
+
+/// The answers of all choices are held at once: 20 bytes a ray and choice.
+const MOST_RAYS: u32 = 10_000_000;
+
+fn hard_sets() -> impl Iterator<Item = (&'static str, HardSet)> {
+    HardSet::ALL.into_iter().map(|set| (set.name(), set))
+}
+
+fn ray_kinds() -> impl Iterator<Item = (&'static str, RayKind)> {
+    RayKind::ALL.into_iter().map(|kind| (kind.name(), kind))
+}
+
+fn repetitions(text: &str) -> std::result::Result<u32, String> {
+    match text.parse::<u32>() {
+        Ok(0) => Ok(0),
+        Ok(count) if (FEWEST_REPETITIONS..=1000).contains(&count) => Ok(count),
+        _ => Err(format!("expected 0, or a number between {FEWEST_REPETITIONS} and 1000")),
+    }
+}
+
+/// Measures all parts and writes the report.
+///
+/// # Errors
+/// An input that cannot be read or measured, a folder that cannot be written to; [`Error::cancelled`] after Ctrl-C, when
+/// the finished parts have been written.
+pub fn run(arguments: &ReportArguments) -> Result<()> {
+    let folder = match &arguments.out {
+        Some(folder) => Some(folder.clone()),
+        None if arguments.json => None,
+        None => Some(PathBuf::from(format!("report-{}", first_name(arguments)))),
+    };
+    for input in &arguments.input {
+        formats::is_scene(input)?;
+    }
+    if let Some(folder) = &folder {
+        fs::create_dir_all(folder).map_err(|cause| Error::system(folder, cause))?;
+        check_writable(&folder.join("report.md"))?;
+    }
+    super::use_threads(arguments.threads)?;
+    let terminal = Terminal::new(false)?;
+    let options = options(arguments);
+    let mut report = Report::new(Environment::detect(commit(), SEED), &options);
+    let mut stopped = None;
+    for part in parts(arguments) {
+        let measured =
+            part.load(arguments, &terminal).and_then(|subject| report::measure(&subject, &[], &options, &terminal));
+        terminal.clear();
+        match measured {
+            Ok(part) => report.subjects.push(part),
+            Err(error) => {
+                stopped = Some(error);
+                break;
+            }
+        }
+    }
+    report.complete = stopped.is_none();
+    if let Some(error) = stopped.take_if(|error| error.fault() != Fault::Cancelled || report.subjects.is_empty()) {
+        return Err(error);
+    }
+    if arguments.json {
+        terminal::print(report.json().as_bytes())?;
+    }
+    if let Some(folder) = &folder {
+        write(&report, folder)?;
+        if !arguments.json {
+            terminal::print(format!("{}\n", folder.join("report.md").display()).as_bytes())?;
+        }
+    }
+    stopped.map_or(Ok(()), Err)
+}
+
+/// What is measured, before it is read.
+enum Part<'a> {
+    File(&'a Path),
+    Hard(HardSet),
+}
+
+fn parts(arguments: &ReportArguments) -> impl Iterator<Item = Part<'_>> {
+    let files = arguments.input.iter().map(|path| Part::File(path));
+    files.chain(arguments.hard_set.iter().map(|&set| Part::Hard(set)))
+}
+
+impl Part<'_> {
+    fn load(&self, arguments: &ReportArguments, terminal: &Terminal) -> Result<Subject> {
+        match self {
+            Self::Hard(set) => Ok(Subject::hard(*set)),
+            Self::File(path) => {
+                let loaded = formats::open(path, &arguments.load.options(), terminal);
+                terminal.clear();
+                let Loaded { scene, ledger, .. } = loaded?;
+                ledger::report(&ledger, false);
+                Subject::of_scene(stem(path), scene).map_err(|error| error.at_path(path))
+            }
+        }
+    }
+}
+
+fn stem(path: &Path) -> String {
+    path.file_stem().map_or_else(|| "scene".into(), |stem| stem.to_string_lossy().into_owned())
+}
+
+fn first_name(arguments: &ReportArguments) -> String {
+    match (arguments.input.first(), arguments.hard_set.first()) {
+        (Some(path), _) => stem(path),
+        (None, Some(set)) => set.name().into(),
+        (None, None) => unreachable!("clap asks for one of the two"),
+    }
+}
+
+fn options(arguments: &ReportArguments) -> Options {
+    let wanted = |kind: &RayKind| arguments.ray_kinds.is_empty() || arguments.ray_kinds.contains(kind);
+    Options {
+        kinds: RayKind::ALL.into_iter().filter(wanted).collect(),
+        rays: arguments.rays as usize,
+        effort: Effort { rays_timed: arguments.timed_rays as usize, repetitions: arguments.repeat },
+    }
+}
+
+/// Writes the files, the page last: where it is new, all that it shows is there.
+fn write(report: &Report, folder: &Path) -> Result<()> {
+    for file in report.files() {
+        let path = folder.join(&file.name);
+        write_atomically(&path, |sink| {
+            sink.write_all(file.text.as_bytes()).map_err(|cause| Error::system(&path, cause))
+        })?;
+    }
+    Ok(())
+}
+
+/// The commit of the checkout that the program was built in, with `-dirty` where files differ from it; `None` where the
+/// program is not in a checkout's folder of build products, or git is not there.
+fn commit() -> Option<String> {
+    let program = std::env::current_exe().ok()?;
+    let root = program.ancestors().skip(1).find(|folder| folder.join("Cargo.toml").is_file())?;
+    let manifest = fs::read_to_string(root.join("Cargo.toml")).ok()?;
+    if !manifest.lines().any(|line| line.trim() == concat!("name = \"", env!("CARGO_PKG_NAME"), "\"")) {
+        return None;
+    }
+    let output = Command::new("git")
+        .arg("-C")
+        .arg(root)
+        .args(["describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"])
+        .output()
+        .ok()?;
+    let name = String::from_utf8(output.stdout).ok()?;
+    (output.status.success() && !name.trim().is_empty()).then(|| name.trim().to_owned())
+}
