@@ -3,13 +3,13 @@
 //! It shares nothing with the renderer's trees. Boxes contain the exact triangles: vertices that are not exact in f64
 //! are rounded outward. A box is passed by only where that is certain: per axis the planes are crossed at
 //! `(plane - o) / d`, a difference and a quotient of f64, together within 2.01 unit roundoffs; ends moved outward by 4
-//! contain the true interval. Nothing under- or overflows to a wrong side: f32 origins and directions lie between
-//! 2^-149 and 2^128, so that quotients of differences down to 2^-1074 are 0 only where the plane is at the origin to
-//! within 2^-946, and a plane at infinity moves the end to infinity. NaN keeps the running end.
+//! contain the true interval. Nothing under- or overflows to a wrong side: differences of f64 are 0 only where they are,
+//! quotients by directions below 2^128 vanish only where the plane is at the origin to within 2^-946, and a quotient that
+//! overflows, or a plane at infinity, leaves no end or moves it to infinity. NaN keeps the running end.
 
 use glam::DVec3;
 
-use crate::geometry::Ray;
+use super::wide_ray::WideRay;
 
 /// A closed box that contains something exactly.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,8 +54,9 @@ pub(super) struct SlabLine {
 }
 
 impl SlabLine {
-    pub fn new(ray: &Ray) -> Self {
-        Self { origin: ray.origin.as_dvec3(), direction: ray.direction.as_dvec3() }
+    pub fn new(ray: impl Into<WideRay>) -> Self {
+        let ray = ray.into();
+        Self { origin: ray.origin, direction: ray.direction }
     }
 }
 
@@ -120,6 +121,11 @@ impl Culling {
         Self { nodes, items }
     }
 
+    /// Bytes of nodes and leaves.
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.nodes.as_slice()) + size_of_val(self.items.as_slice())
+    }
+
     /// Calls `visit` with every item that a line may meet with t between `near` and a limit, nearer boxes first. `visit`
     /// returns the limit from then on, of which negative infinity ends the search.
     pub fn search(&self, line: &SlabLine, near: f64, far: f64, mut visit: impl FnMut(u32) -> f64) {
@@ -153,6 +159,7 @@ impl Culling {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::Ray;
     use crate::math::random::Random;
     use glam::Vec3;
 

@@ -1,7 +1,8 @@
 //! Exact answers: which surfaces a ray meets, and in which order, in exact arithmetic on the inputs as given.
 //!
 //! The inputs are the f32 vertices of meshes as stored, each instance's f64 map to the world, the f64 coefficients and
-//! clip boxes of quadrics, and an f32 [`Ray`] relative to the scene's origin. All are dyadic numbers, and everything asked
+//! clip boxes of quadrics, and a [`WideRay`] relative to the scene's origin, which an f32
+//! [`Ray`](crate::geometry::Ray) is without loss. All are dyadic numbers, and everything asked
 //! of them is the sign of a polynomial ([`triangle`], `quadric.rs`) or a comparison of roots ([`Parameter`]). Maps are
 //! applied to vertices and never inverted. No formula, box or tree is the renderer's.
 //!
@@ -11,13 +12,14 @@
 //!
 //! The conventions are the renderer's: triangles are closed and hit from both sides; a ray in a triangle's plane misses, and
 //! triangles without area are never hit; `t_min <= t <= t_max`, and negative t do not count; hits are ordered by exact
-//! t, then instance, then primitive; a ray that is not [valid](Ray::is_valid) meets nothing.
+//! t, then instance, then primitive; a ray that is not [valid](WideRay::is_valid) meets nothing.
 
 mod culling;
 mod number;
 pub mod parameter;
 mod quadric;
 pub mod triangle;
+mod wide_ray;
 
 #[cfg(test)]
 mod tests;
@@ -28,7 +30,7 @@ use std::cmp::Ordering;
 use glam::{DAffine3, DVec3, Vec3};
 
 use crate::error::{Error, Result};
-use crate::geometry::{Hit, Ray};
+use crate::geometry::Hit;
 use crate::measure::dyadic::Dyadic;
 use crate::render::world::World;
 use crate::scene::{Scene, Shape};
@@ -38,6 +40,7 @@ use quadric::PlacedQuadric;
 use triangle::{Filtered, Line, TriangleAnswer, filter, is_in_range, meet, place};
 
 pub use parameter::Parameter;
+pub use wide_ray::WideRay;
 
 /// A hit, exact.
 #[derive(Debug, Clone)]
@@ -115,7 +118,7 @@ impl From<TriangleAnswer> for Exact {
 /// One ray in all the forms that are asked.
 struct Question<'a> {
     oracle: &'a Oracle,
-    ray: &'a Ray,
+    ray: WideRay,
     exact: Line<Dyadic>,
     rounded: Line<Rounded>,
 }
@@ -157,11 +160,16 @@ impl Oracle {
         Ok(Self { meshes, placed, quadrics, items, culling: Culling::new(&boxes) })
     }
 
+    /// Bytes of the boxes and of what they hold, without the vertices.
+    pub fn bytes(&self) -> usize {
+        self.culling.bytes() + size_of_val(self.items.as_slice())
+    }
+
     /// The first hit.
-    pub fn closest(&self, ray: &Ray) -> Option<ExactHit> {
-        let question = Question::new(self, ray)?;
+    pub fn closest(&self, ray: impl Into<WideRay>) -> Option<ExactHit> {
+        let question = Question::new(self, ray.into())?;
         let mut best: Option<Candidate> = None;
-        question.search(|candidate| {
+        question.search(&everything, |candidate| {
             if best.as_ref().is_none_or(|best| question.compare(&candidate, best) == Ordering::Less) {
                 best = Some(candidate);
             }
@@ -171,10 +179,15 @@ impl Oracle {
     }
 
     /// Whether there is any hit.
-    pub fn occluded(&self, ray: &Ray) -> bool {
-        let Some(question) = Question::new(self, ray) else { return false };
+    pub fn occluded(&self, ray: impl Into<WideRay>) -> bool {
+        self.occluded_by(ray, &everything)
+    }
+
+    /// Whether there is any hit on an instance that `wants` names.
+    pub fn occluded_by(&self, ray: impl Into<WideRay>, wants: &dyn Fn(u32) -> bool) -> bool {
+        let Some(question) = Question::new(self, ray.into()) else { return false };
         let mut found = false;
-        question.search(|_| {
+        question.search(wants, |_| {
             found = true;
             f64::NEG_INFINITY
         });
@@ -182,10 +195,15 @@ impl Oracle {
     }
 
     /// Every hit, in order.
-    pub fn all(&self, ray: &Ray) -> Vec<ExactHit> {
-        let Some(question) = Question::new(self, ray) else { return Vec::new() };
+    pub fn all(&self, ray: impl Into<WideRay>) -> Vec<ExactHit> {
+        self.all_among(ray, &everything)
+    }
+
+    /// Every hit on instances that `wants` names, in order.
+    pub fn all_among(&self, ray: impl Into<WideRay>, wants: &dyn Fn(u32) -> bool) -> Vec<ExactHit> {
+        let Some(question) = Question::new(self, ray.into()) else { return Vec::new() };
         let mut found = Vec::new();
-        question.search(|candidate| {
+        question.search(wants, |candidate| {
             found.push(candidate);
             f64::INFINITY
         });
@@ -207,7 +225,7 @@ impl Oracle {
 
     /// Where a ray's line meets one surface, whatever the ray's interval, in order: at most one hit on a triangle, at most
     /// four on a quadric, all of whose surfaces are given.
-    pub fn on_line(&self, ray: &Ray, instance: u32, primitive: u32) -> Vec<ExactHit> {
+    pub fn on_line(&self, ray: impl Into<WideRay>, instance: u32, primitive: u32) -> Vec<ExactHit> {
         let line = Line::new(ray);
         if let Some((_, quadric)) = self.quadrics.iter().find(|(number, _)| *number == instance) {
             let crossings = quadric.crossings(&line).into_iter();
@@ -221,6 +239,11 @@ impl Oracle {
             .into_iter()
             .collect()
     }
+}
+
+/// Wants every instance.
+fn everything(_: u32) -> bool {
+    true
 }
 
 /// A box around vertices, rounded outward.
@@ -237,27 +260,31 @@ fn enclose(corners: [Vector<Rounded>; 3]) -> DBox {
 }
 
 impl<'a> Question<'a> {
-    fn new(oracle: &'a Oracle, ray: &'a Ray) -> Option<Self> {
+    fn new(oracle: &'a Oracle, ray: WideRay) -> Option<Self> {
         ray.is_valid().then(|| Self { oracle, ray, exact: Line::new(ray), rounded: Line::new(ray) })
     }
 
-    /// Calls `found` with everything that is hit within the ray's interval. It returns the largest t of interest.
-    fn search(&self, mut found: impl FnMut(Candidate) -> f64) {
-        let (near, far) = (f64::from(self.ray.t_min).max(0.0), f64::from(self.ray.t_max));
+    /// Calls `found` with everything on wanted instances that is hit within the ray's interval. It returns the largest t
+    /// of interest.
+    fn search(&self, wants: &dyn Fn(u32) -> bool, mut found: impl FnMut(Candidate) -> f64) {
+        let (near, far) = self.ray.interval();
         let mut limit = far;
         for (instance, quadric) in &self.oracle.quadrics {
-            if quadric.certainly_missed(&self.rounded, near, limit) {
+            if !wants(*instance) || quadric.certainly_missed(&self.rounded, near, limit) {
                 continue;
             }
             for (t, surface) in quadric.crossings(&self.exact) {
-                if is_in_range(self.ray, &t) {
+                if is_in_range(&self.ray, &t) {
                     let item = Item { instance: *instance, triangle: surface };
                     limit = limit.min(found(Candidate::exact(item, Exact { t, weights: None })));
                 }
             }
         }
         self.oracle.culling.search(&SlabLine::new(self.ray), near, limit, |item| {
-            if let Some(candidate) = self.meet(self.oracle.items[item as usize]) {
+            let item = self.oracle.items[item as usize];
+            if wants(item.instance)
+                && let Some(candidate) = self.meet(item)
+            {
                 limit = limit.min(found(candidate));
             }
             limit
@@ -270,16 +297,16 @@ impl<'a> Question<'a> {
         match filter(&self.rounded, &corners.map(|corner| place(to_world.as_ref(), corner))) {
             Filtered::Miss => None,
             Filtered::Hit(low, high) => {
-                let (near, far) = (f64::from(self.ray.t_min).max(0.0), f64::from(self.ray.t_max));
+                let (near, far) = self.ray.interval();
                 if high < near || low > far {
                     return None;
                 }
                 let candidate = Candidate { item, low, high, exact: OnceCell::new() };
-                (low >= near && high <= far || is_in_range(self.ray, &self.exact(&candidate).t)).then_some(candidate)
+                (low >= near && high <= far || is_in_range(&self.ray, &self.exact(&candidate).t)).then_some(candidate)
             }
             Filtered::Unknown => {
                 let answer = self.meet_exactly(item)?;
-                is_in_range(self.ray, &answer.t).then(|| Candidate::exact(item, answer.into()))
+                is_in_range(&self.ray, &answer.t).then(|| Candidate::exact(item, answer.into()))
             }
         }
     }

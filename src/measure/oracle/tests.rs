@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3};
 
 use super::*;
-use crate::geometry::{TriangleMesh, shapes};
+use crate::geometry::{Ray, TriangleMesh, shapes};
 use crate::math::random::Random;
 use crate::scene::Object;
 

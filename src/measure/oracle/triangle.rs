@@ -11,6 +11,7 @@ use glam::{DAffine3, Vec3};
 
 use super::number::{Number, Rounded, Vector, cross, difference, dot, sum, vector};
 use super::parameter::{Parameter, quotient_f32};
+use super::wide_ray::WideRay;
 use crate::geometry::Ray;
 use crate::measure::dyadic::{Dyadic, quotient};
 
@@ -54,12 +55,13 @@ pub fn meet_ray(ray: &Ray, corners: [Vec3; 3]) -> Option<TriangleAnswer> {
     if !ray.is_valid() {
         return None;
     }
-    meet_line(ray, corners).filter(|answer| is_in_range(ray, &answer.t))
+    meet_line(ray, corners).filter(|answer| is_in_range(&ray.into(), &answer.t))
 }
 
 /// Whether `t` lies in the ray's closed interval, of which what is negative does not count.
-pub(super) fn is_in_range(ray: &Ray, t: &Parameter) -> bool {
-    t.compare(f64::from(ray.t_min).max(0.0)) != Ordering::Less && t.compare(ray.t_max.into()) != Ordering::Greater
+pub(super) fn is_in_range(ray: &WideRay, t: &Parameter) -> bool {
+    let (near, far) = ray.interval();
+    t.compare(near) != Ordering::Less && t.compare(far) != Ordering::Greater
 }
 
 /// The squared distance of a line from the segment between two points, as numerator and denominator, exact.
@@ -101,7 +103,8 @@ pub(super) struct Line<N> {
 }
 
 impl<N: Number> Line<N> {
-    pub fn new(ray: &Ray) -> Self {
+    pub fn new(ray: impl Into<WideRay>) -> Self {
+        let ray = ray.into();
         Self { origin: vector(ray.origin), direction: vector(ray.direction) }
     }
 }
