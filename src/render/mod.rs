@@ -6,6 +6,7 @@
 //!                  \--------/
 //! ```
 
+pub mod answers;
 pub mod film;
 pub mod intersect;
 pub mod ray_tracing;
@@ -18,6 +19,7 @@ pub mod surface;
 pub mod trace;
 pub mod world;
 
+pub use answers::Answers;
 pub use film::{Aov, AovKind, Film};
 pub use intersect::Intersect;
 pub use renderer::{BuildStats, Renderer};

@@ -6,8 +6,8 @@ use rayon::prelude::*;
 use crate::error::{Error, Result};
 use crate::geometry::Hit;
 use crate::progress::Progress;
+use crate::render::answers::Answers;
 use crate::render::film::{Aov, AovKind, Film};
-use crate::render::intersect::Intersect;
 use crate::render::sampling;
 use crate::render::settings::{Crop, RayCounts, RenderSettings, RenderStats};
 use crate::render::surface::SurfacePoint;
@@ -43,7 +43,7 @@ struct Tile {
 /// # Errors
 /// A degenerate camera, a film beyond its limits, a crop outside the picture, or no thread to be had.
 #[doc(alias = "RayTracing")]
-pub fn ray_tracing<I: Intersect>(
+pub fn ray_tracing<I: Answers>(
     scene: &Scene,
     world: &World,
     intersect: &I,
@@ -125,7 +125,7 @@ fn tiles_of(area: Crop) -> Vec<Crop> {
 }
 
 /// Renders one tile; `None` once the work is cancelled.
-fn tile_pixels<I: Intersect>(
+fn tile_pixels<I: Answers>(
     tracer: &Tracer<'_, I>,
     camera: &CameraRays,
     area: Crop,
@@ -174,7 +174,7 @@ fn tile_pixels<I: Intersect>(
 }
 
 /// Appends one pixel's extra values, channel by channel.
-fn record<I: Intersect>(
+fn record<I: Answers>(
     tracer: &Tracer<'_, I>,
     view: Option<&ViewRay>,
     hit: &Hit,

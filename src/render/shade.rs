@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use crate::geometry::Hit;
 use crate::math::vector::{dot, normalize};
-use crate::render::intersect::Intersect;
+use crate::render::answers::{Answers, Meeting};
 use crate::render::shadow::Illumination;
 use crate::render::surface::SurfacePoint;
 use crate::render::trace::{TracedRay, Tracer};
@@ -30,20 +30,21 @@ pub enum Refraction {
     Total,
 }
 
-impl<I: Intersect> Tracer<'_, I> {
+impl<I: Answers> Tracer<'_, I> {
     /// The linear colour of the point that `hit` found along `view`.
     #[doc(alias = "Shade")]
     pub fn shade(&self, view: &ViewRay, hit: &Hit, depth: u32) -> Rgb {
         let point = SurfacePoint::of(self.scene, self.world, view, hit);
         let material = &self.scene.materials[point.material as usize];
         let colors = self.colors(&point, hit);
+        let here = Meeting { view, hit, point: &point };
 
         // Ambient, then each light: diffuse and highlight.
         let mut color = colors.ambient;
         let lights = &self.world.lights;
         for light in if compiled::MANY_LIGHTS { lights } else { &lights[..1] } {
             let Some(illumination) = Illumination::at(light, &point) else { continue };
-            let visible = self.visibility(&point, &illumination);
+            let visible = self.visibility(&here, &illumination);
             if visible != Rgb::ZERO {
                 color += visible * illumination.color * direct(material, colors.diffuse, &point, view, &illumination);
             }
@@ -53,10 +54,10 @@ impl<I: Intersect> Tracer<'_, I> {
         if depth < self.scene.film.max_depth {
             if compiled::REFLECTION && material.is_reflective() {
                 self.count(|counts| counts.reflected += 1);
-                color += material.kr * self.trace(&reflected_ray(&point, view), depth + 1);
+                color += material.kr * self.trace(&self.reflected_ray(&here), depth + 1);
             }
             if compiled::REFRACTION && material.is_transmissive() {
-                color += material.kt * self.trace(&self.transmitted_ray(&point, material, view), depth + 1);
+                color += material.kt * self.trace(&self.transmitted_ray(&here, material), depth + 1);
             }
         }
 
@@ -81,15 +82,23 @@ impl<I: Intersect> Tracer<'_, I> {
         SurfaceColors { ambient: ambient + material.emission, diffuse }
     }
 
-    fn transmitted_ray(&self, point: &SurfacePoint, material: &Material, view: &ViewRay) -> TracedRay {
-        match refract(point, f64::from(material.ior), view.direction) {
+    /// The mirror ray of a point.
+    fn reflected_ray(&self, from: &Meeting<'_>) -> TracedRay<I::Ray> {
+        let direction = reflect(from.point, from.view.direction);
+        let view = ViewRay { origin: from.point.position, direction };
+        TracedRay { ray: self.intersect.ray_outside(from, direction), view }
+    }
+
+    fn transmitted_ray(&self, from: &Meeting<'_>, material: &Material) -> TracedRay<I::Ray> {
+        match refract(from.point, f64::from(material.ior), from.view.direction) {
             Refraction::Through(direction) => {
                 self.count(|counts| counts.refracted += 1);
-                TracedRay::spawned(point.origin_inside(), point.position, direction)
+                let view = ViewRay { origin: from.point.position, direction };
+                TracedRay { ray: self.intersect.ray_inside(from, direction), view }
             }
             Refraction::Total => {
                 self.count(|counts| counts.reflected += 1);
-                reflected_ray(point, view)
+                self.reflected_ray(from)
             }
         }
     }
@@ -127,11 +136,6 @@ fn highlight(x: f64, n: f32) -> f64 {
     } else {
         libm::pow(x, f64::from(n))
     }
-}
-
-/// The mirror ray of a point.
-fn reflected_ray(point: &SurfacePoint, view: &ViewRay) -> TracedRay {
-    TracedRay::spawned(point.origin_outside(), point.position, reflect(point, view.direction))
 }
 
 /// The mirror direction, never below the surface.

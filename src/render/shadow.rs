@@ -3,12 +3,10 @@
 use glam::DVec3;
 
 use crate::error::{Error, Result};
-use crate::geometry::{Key, Ray};
-use crate::math::float::{gamma, round_down};
-use crate::math::vector::{dot, length, normalize};
-use crate::render::intersect::Intersect;
+use crate::math::vector::{dot, normalize};
+use crate::render::answers::{Answers, Meeting};
 use crate::render::surface::SurfacePoint;
-use crate::render::trace::{SPAWNED_T_MIN, Tracer};
+use crate::render::trace::Tracer;
 use crate::scene::{Falloff, Light, LightKind, Rgb, compiled};
 
 /// The light that would reach a point if nothing stood between.
@@ -117,46 +115,23 @@ fn cone(cosine: f64, inner: f64, outer: f64) -> Option<f64> {
     (share > 0.0).then_some(share * share)
 }
 
-impl<I: Intersect> Tracer<'_, I> {
+impl<I: Answers> Tracer<'_, I> {
     /// Si, per channel: 0 where an opaque surface blocks the light, the product of kt over the surfaces crossed, in
     /// the order of hits, where they let light through, else 1.
-    pub fn visibility(&self, point: &SurfacePoint, illumination: &Illumination) -> Rgb {
-        let ray = shadow_ray(point, illumination);
+    pub fn visibility(&self, from: &Meeting<'_>, illumination: &Illumination) -> Rgb {
+        let ray = self.intersect.shadow_ray(from, illumination);
         self.count(|counts| counts.shadow += 1);
-        if self.intersect.occluded_by_opaque(&ray) {
+        if self.intersect.is_blocked_by_opaque(&ray) {
             return Rgb::ZERO;
         }
         let mut visible = Rgb::ONE;
         if self.world.all_opaque || !compiled::REFRACTION {
             return visible;
         }
-        let mut hit = self.intersect.next_transmissive_after(&ray, Key::BEFORE_ALL);
-        while hit.is_hit() {
+        self.intersect.visit_transmissive(&ray, |hit| {
             visible *= self.scene.materials[self.scene.material_of(hit.instance, hit.primitive) as usize].kt;
-            if visible == Rgb::ZERO {
-                break;
-            }
-            hit = self.intersect.next_transmissive_after(&ray, hit.key());
-        }
+            visible != Rgb::ZERO
+        });
         visible
     }
-}
-
-/// The ray from a point to a light: direction of any length; it ends just before the light.
-///
-/// The end is the light's place rounded to f32, as vertices are, and shortened by a bound like that which moves the
-/// start of a ray off a surface: a lamp whose coordinates are those of a ceiling shines, at grazing angles too.
-fn shadow_ray(point: &SurfacePoint, illumination: &Illumination) -> Ray {
-    let origin = point.origin_outside();
-    let (direction, t_max) = match illumination.position {
-        None => (illumination.to_light, f32::INFINITY),
-        Some(position) => {
-            let position = position.as_vec3().as_dvec3();
-            let offset = position - origin.as_dvec3();
-            let distance = length(offset);
-            let error = gamma(7) * (position.abs().max_element() + distance);
-            (offset, round_down(1.0 - error / distance))
-        }
-    };
-    Ray { origin, t_min: SPAWNED_T_MIN, direction: direction.as_vec3(), t_max }
 }

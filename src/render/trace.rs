@@ -2,19 +2,15 @@
 
 use std::cell::Cell;
 
-use glam::{DVec2, DVec3, Vec3};
+use glam::{DVec2, DVec3};
 
 use crate::geometry::{Hit, Ray};
 use crate::math::vector::dot;
-use crate::render::intersect::Intersect;
+use crate::render::answers::Answers;
 use crate::render::settings::RayCounts;
 use crate::render::world::World;
 use crate::scene::camera::ViewRay;
 use crate::scene::{Background, Rgb, Scene};
-
-/// Spawned rays begin at the smallest normal number, not at 0: a ray whose rounded origin still lies on its own
-/// surface must not find it.
-pub(super) const SPAWNED_T_MIN: f32 = f32::MIN_POSITIVE;
 
 /// Traces rays through a scene and shades what they hit; one per thread, since it counts.
 pub struct Tracer<'a, I> {
@@ -27,12 +23,12 @@ pub struct Tracer<'a, I> {
     pub(super) counts: Cell<RayCounts>,
 }
 
-/// A ray on its way: in f32 for the trees, in f64 for shading.
+/// A ray on its way: in the precision of what answers it, and in f64 for shading.
 #[derive(Debug, Clone, Copy)]
-pub struct TracedRay {
+pub struct TracedRay<R = Ray> {
     /// What is intersected.
-    pub ray: Ray,
-    /// The same ray before rounding, with unit direction.
+    pub ray: R,
+    /// The same ray before rounding, with unit direction, from the surface itself.
     pub view: ViewRay,
 }
 
@@ -41,16 +37,9 @@ impl TracedRay {
     pub fn camera(view: ViewRay) -> Self {
         Self { ray: Ray::new(view.origin.as_vec3(), view.direction.as_vec3()), view }
     }
-
-    /// A ray that leaves a surface: it starts at `offset_origin`, which is `origin` moved off the surface.
-    pub(super) fn spawned(offset_origin: Vec3, origin: DVec3, direction: DVec3) -> Self {
-        let ray =
-            Ray { origin: offset_origin, t_min: SPAWNED_T_MIN, direction: direction.as_vec3(), t_max: f32::INFINITY };
-        Self { ray, view: ViewRay { origin, direction } }
-    }
 }
 
-impl<'a, I: Intersect> Tracer<'a, I> {
+impl<'a, I: Answers> Tracer<'a, I> {
     /// A tracer that has counted nothing yet.
     pub fn new(scene: &'a Scene, world: &'a World, intersect: &'a I) -> Self {
         Self { scene, world, intersect, counts: Cell::default() }
@@ -60,18 +49,18 @@ impl<'a, I: Intersect> Tracer<'a, I> {
     ///
     /// The nearest hit is shaded; a ray that hits nothing sees the background.
     #[doc(alias = "Trace")]
-    pub fn trace(&self, ray: &TracedRay, depth: u32) -> Rgb {
+    pub fn trace(&self, ray: &TracedRay<I::Ray>, depth: u32) -> Rgb {
         self.trace_hit(ray, depth).0
     }
 
     /// What a camera ray sees and what it hit.
     pub fn trace_camera(&self, view: ViewRay) -> (Rgb, Hit) {
         self.count(|counts| counts.camera += 1);
-        self.trace_hit(&TracedRay::camera(view), 0)
+        self.trace_hit(&TracedRay { ray: self.intersect.camera_ray(&view), view }, 0)
     }
 
-    fn trace_hit(&self, ray: &TracedRay, depth: u32) -> (Rgb, Hit) {
-        let hit = self.intersect.closest(&ray.ray);
+    fn trace_hit(&self, ray: &TracedRay<I::Ray>, depth: u32) -> (Rgb, Hit) {
+        let hit = self.intersect.first_hit(&ray.ray);
         let color = if hit.is_hit() {
             self.shade(&ray.view, &hit, depth)
         } else {
