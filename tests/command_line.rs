@@ -565,6 +565,7 @@ fn the_statistics_of_a_rendering_are_stable() {
             "settings.crop.x1",
             "settings.crop.y1",
             "settings.aov",
+            "settings.precision",
             "settings.accelerator",
             "settings.preset",
             "settings.threads",

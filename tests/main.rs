@@ -12,6 +12,7 @@ mod instances;
 mod metamorphic;
 mod models;
 mod query;
+mod reference;
 mod report;
 mod shading;
 mod spawned_rays;

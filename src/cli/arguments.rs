@@ -7,6 +7,7 @@ use clap_complete::Shell;
 
 use super::check::CheckArguments;
 use super::diff::DiffArguments;
+use super::precision::Precision;
 use super::query::QueryArguments;
 use super::report::ReportArguments;
 use super::values::{self, Orbit, one_of};
@@ -80,6 +81,12 @@ pub struct RenderArguments {
     /// Print nothing but errors.
     #[arg(long, conflicts_with = "verbose", help_heading = "Output")]
     pub quiet: bool,
+
+    /// f32: rays in f32 through the acceleration structures. f64: the reference that such pictures are measured
+    /// against, rays in f64 with exact hits, a hundred times slower.
+    #[arg(long, value_name = "TYPE", value_parser = one_of(Precision::NAMES), default_value = "f32",
+        help_heading = "Picture")]
+    pub precision: Precision,
 
     /// What the picture is like.
     #[command(flatten)]
@@ -311,6 +318,7 @@ mod tests {
         check(TRANSFERS);
         check(UP_AXES);
         check(NORMAL_MODES);
+        check(Precision::NAMES);
     }
 
     #[test]

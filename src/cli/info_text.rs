@@ -73,8 +73,9 @@ fn place(table: &mut Table, info: &Info<'_>) {
     }
     table.row("scene origin", point(info.origin));
     if let Some(rounding) = &info.rounding {
-        let edge = rounding.finest_edge.map_or("none".into(), |edge| format!("{:.3e}", edge));
-        table.row("coordinate loss", format!("{:.3e} at most; finest edge {edge}", rounding.coordinate_loss));
+        let size = |x: f64| if x == 0.0 { "none".into() } else { format!("{x:.3e}") };
+        table.row("coordinate loss", size(rounding.coordinate_loss));
+        table.row("finest edge", size(rounding.finest_edge.unwrap_or(0.0)));
     }
     let film = &info.film;
     table.row("picture", format!("{}x{}, {} samples a pixel", film.width, film.height, film.samples));

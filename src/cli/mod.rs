@@ -13,6 +13,7 @@ mod info;
 mod info_text;
 mod ledger;
 mod outputs;
+mod precision;
 mod query;
 mod render;
 mod report;

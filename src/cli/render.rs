@@ -5,13 +5,14 @@ use std::path::Path;
 
 use super::arguments::RenderArguments;
 use super::outputs::{Outputs, Picture};
+use super::precision::AnyRenderer;
 use super::stats_json::{Bytes, SCHEMA, Seconds, Settings, Stats, timed};
 use super::terminal::{self, Terminal};
 use super::{camera, ledger, outputs};
 use crate::error::{Error, Result};
 use crate::formats::{self, picture};
 use crate::progress::Progress;
-use crate::render::{Crop, Film, Renderer};
+use crate::render::{Crop, Film};
 use crate::scene::FilmSettings;
 
 /// Renders a picture and writes all that was asked for.
@@ -56,7 +57,8 @@ pub fn run(arguments: &RenderArguments) -> Result<()> {
     }
 
     let renderer;
-    (renderer, seconds.build) = timed(|| Renderer::build(scene, &arguments.build.params(), &terminal));
+    (renderer, seconds.build) =
+        timed(|| AnyRenderer::build(scene, arguments.precision, &arguments.build.params(), &terminal));
     terminal.clear();
     let renderer = renderer?;
     report_time("build", seconds.build);
@@ -91,6 +93,7 @@ pub fn run(arguments: &RenderArguments) -> Result<()> {
                 camera: &scene.cameras[scene.active_camera].name,
                 crop: settings.crop,
                 aov: &settings.aovs,
+                precision: arguments.precision,
                 accelerator: &build.accelerator,
                 preset: arguments.build.preset,
                 threads: film.stats.threads,

@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use serde::Serialize;
 
+use super::precision::Precision;
 use crate::accel::Preset;
 use crate::render::{AovKind, BuildStats, Crop, Film, RayCounts};
 use crate::scene::{FilmSettings, Scene};
@@ -46,6 +47,8 @@ pub struct Settings<'a> {
     pub crop: Option<Crop>,
     /// Extra values.
     pub aov: &'a [AovKind],
+    /// In what rays were traced.
+    pub precision: Precision,
     /// The acceleration structure, chosen if it was left open.
     pub accelerator: &'a str,
     /// How it was built.

@@ -19,6 +19,7 @@
 //! | [`speed`], [`sweep`] | interleaved timing; rates with intervals, and what is dominated |
 //! | [`table`], [`plot`] | Markdown tables; scatter plots as SVG |
 //! | [`report`] | speed against error, as `whitted report` writes it |
+//! | [`reference`](mod@reference) | the picture of f64 rays and exact hits |
 //! | [`statistics`] | rates with their bounds, quantiles, medians with intervals |
 
 pub mod cases;
@@ -33,6 +34,7 @@ pub mod oracle;
 pub mod picture_difference;
 pub mod plot;
 pub mod ray_file;
+pub mod reference;
 pub mod report;
 pub mod scenes;
 pub mod speed;

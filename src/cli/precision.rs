@@ -1,0 +1,65 @@
+//! `--precision`: in what rays are traced.
+
+use crate::accel::Params;
+use crate::error::Result;
+use crate::measure::reference::ReferenceRenderer;
+use crate::progress::Progress;
+use crate::render::{BuildStats, Film, RenderSettings, Renderer};
+use crate::scene::Scene;
+
+/// In what rays are traced.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Precision {
+    /// f32 rays through the acceleration structures.
+    F32,
+    /// f64 rays with exact hits.
+    F64,
+}
+
+impl Precision {
+    /// All of them with their names.
+    pub const NAMES: [(&'static str, Self); 2] = [("f32", Self::F32), ("f64", Self::F64)];
+}
+
+/// A scene ready to be rendered in either.
+pub enum AnyRenderer {
+    /// In f32.
+    F32(Box<Renderer>),
+    /// In f64.
+    F64(Box<ReferenceRenderer>),
+}
+
+impl AnyRenderer {
+    /// Builds what the precision needs; `params` are for f32 alone.
+    pub fn build(scene: Scene, precision: Precision, params: &Params, progress: &dyn Progress) -> Result<Self> {
+        Ok(match precision {
+            Precision::F32 => Self::F32(Box::new(Renderer::build(scene, params, progress)?)),
+            Precision::F64 => Self::F64(Box::new(ReferenceRenderer::build(scene, progress)?)),
+        })
+    }
+
+    /// Renders the scene.
+    pub fn render(&self, settings: &RenderSettings, progress: &dyn Progress) -> Result<Film> {
+        match self {
+            Self::F32(renderer) => renderer.render(settings, progress),
+            Self::F64(renderer) => renderer.render(settings, progress),
+        }
+    }
+
+    /// The scene.
+    pub fn scene(&self) -> &Scene {
+        match self {
+            Self::F32(renderer) => renderer.scene(),
+            Self::F64(renderer) => renderer.scene(),
+        }
+    }
+
+    /// What building took.
+    pub fn build_stats(&self) -> &BuildStats {
+        match self {
+            Self::F32(renderer) => renderer.build_stats(),
+            Self::F64(renderer) => renderer.build_stats(),
+        }
+    }
+}
