@@ -59,19 +59,23 @@ const SPAWNED_T_MIN: f32 = f32::MIN_POSITIVE;
 impl<I: Intersect> Answers for I {
     type Ray = Ray;
 
+    #[inline(always)]
     fn camera_ray(&self, view: &ViewRay) -> Ray {
         TracedRay::camera(*view).ray
     }
 
+    #[inline(always)]
     fn ray_outside(&self, from: &Meeting<'_>, direction: DVec3) -> Ray {
         spawned(from.point.origin_outside(), direction)
     }
 
+    #[inline(always)]
     fn ray_inside(&self, from: &Meeting<'_>, direction: DVec3) -> Ray {
         spawned(from.point.origin_inside(), direction)
     }
 
     /// Its direction has any length. The light's place is rounded to f32, as vertices are.
+    #[inline(always)]
     fn shadow_ray(&self, from: &Meeting<'_>, illumination: &Illumination) -> Ray {
         let origin = from.point.origin_outside();
         let (direction, t_max) = match illumination.position {
@@ -84,14 +88,17 @@ impl<I: Intersect> Answers for I {
         Ray { origin, t_min: SPAWNED_T_MIN, direction: direction.as_vec3(), t_max }
     }
 
+    #[inline(always)]
     fn first_hit(&self, ray: &Ray) -> Hit {
         self.closest(ray)
     }
 
+    #[inline(always)]
     fn is_blocked_by_opaque(&self, ray: &Ray) -> bool {
         self.occluded_by_opaque(ray)
     }
 
+    #[inline(always)]
     fn visit_transmissive(&self, ray: &Ray, mut visit: impl FnMut(&Hit) -> bool) {
         let mut hit = self.next_transmissive_after(ray, Key::BEFORE_ALL);
         while hit.is_hit() && visit(&hit) {
@@ -101,6 +108,7 @@ impl<I: Intersect> Answers for I {
 }
 
 /// A ray that starts at `origin`, which was moved off a surface.
+#[inline(always)]
 fn spawned(origin: Vec3, direction: DVec3) -> Ray {
     Ray { origin, t_min: SPAWNED_T_MIN, direction: direction.as_vec3(), t_max: f32::INFINITY }
 }
@@ -109,6 +117,7 @@ fn spawned(origin: Vec3, direction: DVec3) -> Ray {
 ///
 /// The end is shortened by a bound like that which moves the start of a ray off a surface, on how far f32 vertices are
 /// from where they should be: a lamp whose coordinates are those of a ceiling shines, at grazing angles too.
+#[inline(always)]
 pub fn towards(position: DVec3, origin: DVec3) -> (DVec3, f64) {
     let offset = position - origin;
     let distance = length(offset);
