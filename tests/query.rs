@@ -236,6 +236,18 @@ fn a_pipe_is_answered_as_it_is_filled_and_may_be_closed() {
     assert_eq!((output.status.code(), text(&output.stderr)), (Some(0), String::new()));
 }
 
+#[test]
+fn a_model_is_compared_with_exact_answers() {
+    let workshop = workshop();
+    let table = text(&workshop.succeed("check --model scene.toml --rays 900"));
+    let words: Vec<&str> = table.lines().find(|line| line.starts_with("all ")).unwrap().split_whitespace().collect();
+    // Rays, hits, seven classes of which the last is `wrong`, the worst t, those outside their bound, structures that differ.
+    assert_eq!((words.len(), words[1], words[9], words[11], words[12]), (13, "900", "0", "0", "0"), "{table}");
+    assert_eq!(table, text(&workshop.succeed("check --model scene.toml --rays 900 --threads 1")));
+    assert!(workshop.fail("check --model none.obj").contains("none.obj"));
+    assert_eq!(workshop.run("check D1 --model scene.toml").status.code(), Some(2));
+}
+
 #[cfg(unix)]
 #[test]
 fn an_interrupt_ends_a_query_that_waits_for_rays() {

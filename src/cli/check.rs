@@ -1,13 +1,14 @@
 //! `whitted check`.
 
 use std::fmt::Write;
+use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, ValueHint};
 
-use super::check_json;
 use super::stats_json::timed;
 use super::terminal::{self, Terminal};
 use super::{arguments, values};
+use super::{check_json, check_model};
 use crate::accel::Kind;
 use crate::error::{Error, Result};
 use crate::measure::cases::{self, Case, Context, Effort, Failure, Figure, Outcome};
@@ -26,6 +27,12 @@ pub struct CheckArguments {
     /// Print one JSON document.
     #[arg(long)]
     pub json: bool,
+    /// Instead of the cases, compare the answers to rays of many kinds with exact ones, on this scene or model.
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath, conflicts_with_all = ["cases", "full", "json"])]
+    pub model: Option<PathBuf>,
+    /// How many rays are compared on a model.
+    #[arg(long, value_name = "N", default_value_t = 100_000, requires = "model")]
+    pub rays: u64,
     /// Structures to ask; may be given more than once. All of them if it is not given.
     #[arg(long, value_name = "KIND", value_parser = values::one_of(arguments::accelerators()))]
     pub accelerator: Vec<Kind>,
@@ -57,6 +64,9 @@ pub fn run(arguments: &CheckArguments) -> Result<()> {
     let kinds = kinds(&arguments.accelerator);
     super::use_threads(arguments.threads)?;
     let terminal = Terminal::new(false)?;
+    if let Some(path) = &arguments.model {
+        return check_model::run(path, &kinds, arguments, &terminal);
+    }
     let effort = if arguments.full { Effort::Full } else { Effort::Quick };
     if !arguments.json {
         terminal::print(HEADER.as_bytes())?;

@@ -7,6 +7,7 @@ pub mod arguments;
 mod camera;
 mod check;
 mod check_json;
+mod check_model;
 mod completions;
 mod diff;
 mod info;

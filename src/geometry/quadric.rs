@@ -172,6 +172,11 @@ impl Quadric {
         &self.clip
     }
 
+    /// The centre, object space; where there is none, the point of the axis nearest to the object's origin.
+    pub fn center(&self) -> DVec3 {
+        self.form.center()
+    }
+
     /// A box around the clipped surface in object space; `None` if it goes to infinity.
     pub fn bounds(&self) -> Option<Bounds> {
         self.bounds

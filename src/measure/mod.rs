@@ -8,12 +8,14 @@
 //! | [`dyadic`] | exact numbers |
 //! | [`hexadecimal`] | numbers written exactly |
 //! | [`machine`] | what answers were computed on |
+//! | [`agreement`] | whether the renderer agrees with exact answers, by classes with proven bounds |
 //! | [`cases`] | the hard cases and what they count |
 //! | [`features`] | what each feature of a scene costs it, present and absent |
 //! | [`picture_difference`], [`heatmap`] | how far two pictures are apart, and where |
 //! | [`oracle`] | exact hits |
 //! | [`scenes`] | small scenes with known answers |
 //! | [`light_paths`] | shadows and mirrors: acne, leaks, contact gaps, positions after bounces |
+//! | [`rays`] | families of rays for any scene |
 //! | [`ray_file`], [`hit_file`] | rays from files, answers to files |
 //! | [`variants`] | other ways to do what the renderer does, from their publications |
 //! | [`speed`], [`sweep`] | interleaved timing; rates with intervals, and what is dominated |
@@ -22,6 +24,7 @@
 //! | [`reference`](mod@reference) | the picture of f64 rays and exact hits |
 //! | [`statistics`] | rates with their bounds, quantiles, medians with intervals |
 
+pub mod agreement;
 pub mod cases;
 pub mod dyadic;
 pub mod features;
@@ -34,6 +37,7 @@ pub mod oracle;
 pub mod picture_difference;
 pub mod plot;
 pub mod ray_file;
+pub mod rays;
 pub mod reference;
 pub mod report;
 pub mod scenes;

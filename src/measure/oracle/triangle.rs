@@ -69,8 +69,25 @@ pub(super) fn is_in_range(ray: &WideRay, t: &Parameter) -> bool {
 /// For |a x d|, the distance of the line from a point times |d|: at `a + s e` its square is a parabola in s, whose least
 /// value is `(d . (a x e))^2 |d|^2 / |e x d|^2`; where that lies beyond an end, the end is nearest.
 pub fn squared_distance(ray: &Ray, ends: [Vec3; 2]) -> (Dyadic, Dyadic) {
+    squared_world_distance(ray, ends, None)
+}
+
+/// The distance of a ray's line from the segment between two points, rounded to the nearest f64 or its neighbour.
+pub fn distance(ray: &Ray, ends: [Vec3; 2]) -> f64 {
+    world_distance(ray, ends, None)
+}
+
+/// [`distance`] from the segment between two points that a map places in the world.
+pub fn world_distance(ray: &Ray, ends: [Vec3; 2], to_world: Option<&DAffine3>) -> f64 {
+    let (numerator, denominator) = squared_world_distance(ray, ends, to_world);
+    // Scaled by an even power of two that keeps the square far from underflow.
+    let scale = 400;
+    quotient(&numerator.scaled(scale), &denominator).sqrt() * libm::ldexp(1.0, -(scale as i32) / 2)
+}
+
+fn squared_world_distance(ray: &Ray, ends: [Vec3; 2], to_world: Option<&DAffine3>) -> (Dyadic, Dyadic) {
     let Line { origin, direction: d } = Line::<Dyadic>::new(ray);
-    let [a, b] = ends.map(|end| difference(&vector::<Dyadic>(end.as_dvec3()), &origin));
+    let [a, b] = ends.map(|end| difference(&place::<Dyadic>(to_world, end), &origin));
     let e = difference(&b, &a);
     let (across, from_a) = (cross(&e, &d), cross(&a, &d));
     let steepness = dot(&across, &across);
@@ -85,14 +102,6 @@ pub fn squared_distance(ray: &Ray, ends: [Vec3; 2]) -> (Dyadic, Dyadic) {
         let volume = dot(&d, &cross(&a, &e));
         (&volume * &volume, steepness)
     }
-}
-
-/// The distance of a ray's line from the segment between two points, rounded to the nearest f64 or its neighbour.
-pub fn distance(ray: &Ray, ends: [Vec3; 2]) -> f64 {
-    let (numerator, denominator) = squared_distance(ray, ends);
-    // Scaled by an even power of two that keeps the square far from underflow.
-    let scale = 400;
-    quotient(&numerator.scaled(scale), &denominator).sqrt() * libm::ldexp(1.0, -(scale as i32) / 2)
 }
 
 /// A ray's line in one kind of numbers.
