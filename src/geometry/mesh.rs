@@ -76,7 +76,7 @@ impl Default for Materials {
 /// How many triangles were dropped, by reason.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
 pub struct DroppedCounts {
-    /// A vertex that is NaN, infinite or beyond 2^40 in magnitude.
+    /// A vertex that is NaN, infinite or, as stored, beyond [`FARTHEST_COORDINATE`] in magnitude.
     pub non_finite: u64,
     /// No area, decided exactly.
     pub zero_area: u64,
@@ -91,9 +91,14 @@ impl DroppedCounts {
     }
 }
 
-/// Coordinates of larger magnitude are treated as not finite. The triangle test multiplies three differences of
-/// coordinates: 32 times the cube of this must stay below the largest f32.
+/// The largest magnitude that usual meshes have, and one over the smallest. A mesh most of whose vertices lie beyond
+/// is stored divided by a power of two.
 pub const LARGEST_COORDINATE: f32 = (1u64 << 40) as f32;
+
+/// Vertices farther out, as stored, are treated as not finite. The triangle test subtracts a ray's origin, shears, and
+/// multiplies in f32 only to find what is certainly missed; up to here no difference of two such numbers, sheared, comes
+/// near the largest f32, and neither do the boxes of trees.
+pub const FARTHEST_COORDINATE: f32 = (1u64 << 63) as f32;
 
 impl TriangleMesh {
     /// Checks the arrays against each other and lists the triangles that cannot be hit. Loaders call it once.
@@ -135,7 +140,7 @@ impl TriangleMesh {
         for (number, indices) in self.indices.iter().enumerate() {
             let reason = match indices.map(|i| self.positions.get(i as usize).copied()) {
                 [Some(a), Some(b), Some(c)] => {
-                    let usable = |p: Vec3| p.abs().cmple(Vec3::splat(LARGEST_COORDINATE)).all();
+                    let usable = |p: Vec3| p.abs().cmple(Vec3::splat(FARTHEST_COORDINATE)).all();
                     if !(usable(a) && usable(b) && usable(c)) {
                         &mut counts.non_finite
                     } else if has_zero_area(a, b, c) {
@@ -166,7 +171,7 @@ impl TriangleMesh {
     }
 
     /// Divides the positions by a power of two, exactly, where most of them lie beyond [`LARGEST_COORDINATE`] or all
-    /// but within its reciprocal. A few vertices far out do not count: their triangles are dropped.
+    /// but within its reciprocal. A few vertices far out do not count.
     fn bring_into_range(&mut self) {
         let usual = 1.0 / LARGEST_COORDINATE..=LARGEST_COORDINATE;
         let magnitude = |p: &Vec3| p.is_finite().then(|| p.abs().max_element()).filter(|&m| m > 0.0);
@@ -312,11 +317,14 @@ mod tests {
                 assert_eq!(mesh.file_position(stored), given.as_dvec3(), "{size:e}");
             }
         }
-        // One vertex far out leaves the others alone.
-        let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::splat(3e38)];
-        let mesh = TriangleMesh { positions, indices: vec![[0, 1, 2], [0, 1, 3]], ..Default::default() };
-        let mesh = mesh.finish().unwrap();
-        assert_eq!((mesh.exponent, mesh.live_count()), (0, 1));
+        // One vertex far out leaves the others alone; it is dropped where f32 could not answer for it.
+        for (far, live) in [(3e38, 1), (1.8e18, 2), (FARTHEST_COORDINATE, 2), (FARTHEST_COORDINATE.next_up(), 1)] {
+            let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::splat(far)];
+            let mesh = TriangleMesh { positions, indices: vec![[0, 1, 2], [0, 1, 3]], ..Default::default() };
+            let mesh = mesh.finish().unwrap();
+            assert_eq!((mesh.exponent, mesh.live_count()), (0, live), "{far:e}");
+            assert_eq!(mesh.dropped_counts.non_finite, 2 - live as u64, "{far:e}");
+        }
     }
 
     #[test]

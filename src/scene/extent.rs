@@ -10,7 +10,7 @@ use crate::scene::{Object, Scene, Shape};
 /// How an object is of no use to the renderer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Misfit {
-    /// Some of it lies beyond 2^40, or nowhere.
+    /// Some of it lies beyond 2^40, and beyond the farthest vertex of its mesh where that is farther, or nowhere.
     TooFar,
     /// It is smaller than 2^-40 along every axis.
     TooSmall,
@@ -55,8 +55,17 @@ impl Extents {
     /// What keeps the object from being rendered, if anything. Of what goes to infinity, the place alone counts.
     pub fn misfit(&self, scene: &Scene, object: &Object) -> Option<Misfit> {
         let largest = f64::from(LARGEST_COORDINATE);
+        // A mesh may lie where its file puts it, as long as its objects go no farther.
+        let farthest = match object.shape {
+            Shape::Mesh(number) if !self.meshes[number as usize].is_empty() => {
+                let mesh = &scene.meshes[number as usize];
+                let corners = self.meshes[number as usize].corners();
+                corners.map(|p| mesh.file_position(p).abs().max_element()).into_iter().fold(largest, f64::max)
+            }
+            _ => largest,
+        };
         // Written so that NaN is too far.
-        let is_near = |p: DVec3| p.abs().cmple(DVec3::splat(largest)).all();
+        let is_near = |p: DVec3| p.abs().cmple(DVec3::splat(farthest)).all();
         let Some(corners) = self.corners(scene, object) else {
             return (!is_near(object.transform.translation)).then_some(Misfit::TooFar);
         };
