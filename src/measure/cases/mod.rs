@@ -4,10 +4,17 @@
 //! renderer, and counts what is wrong. Bars are fixed in the case; nothing is scaled to what was measured. The manual's
 //! page on them is [`crate::manual::hard_cases`].
 
+mod agreement;
+mod boundaries;
+pub mod exact;
+mod extremes;
+pub mod histogram;
 pub mod meshes;
 pub mod outcome;
 pub mod reduce;
 pub mod structure;
+mod tightness;
+mod trees;
 mod triangles;
 mod watertight;
 
@@ -39,7 +46,15 @@ pub struct Case {
 }
 
 /// All cases, in groups; [`all`] has them in their order.
-pub const ALL: &[&[Case]] = &[watertight::CASES, triangles::CASES];
+pub const ALL: &[&[Case]] = &[
+    watertight::CASES,
+    triangles::CASES,
+    tightness::CASES,
+    boundaries::CASES,
+    trees::CASES,
+    agreement::CASES,
+    extremes::CASES,
+];
 
 /// How many rays a case may take.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]

@@ -72,12 +72,11 @@ impl Outcome {
     }
 
     /// Notes a number; of two with one name the larger stays, and NaN is larger than anything.
-    pub fn figure(&mut self, name: impl Into<String>, value: f64, bar: Option<f64>) {
-        let name = name.into();
-        match self.figures.iter_mut().find(|figure| figure.name == name) {
+    pub fn figure(&mut self, name: impl Into<String> + AsRef<str>, value: f64, bar: Option<f64>) {
+        match self.figures.iter_mut().find(|figure| figure.name == name.as_ref()) {
             Some(figure) if value.is_nan() || value > figure.value => figure.value = value,
             Some(_) => {}
-            None => self.figures.push(Figure { name, value, bar }),
+            None => self.figures.push(Figure { name: name.into(), value, bar }),
         }
     }
 
