@@ -58,8 +58,9 @@ fn well_formed_is_told_from_broken() {
 #[test]
 fn the_leaks_of_a_closed_sphere_are_found_and_ours_has_none() {
     let workshop = Workshop::new();
-    let printed = workshop
-        .succeed("report --hard-set sphere --ray-kinds random,vertex --rays 3000 --timed-rays 50 --repeat 10 --out r");
+    let printed = workshop.succeed(
+        "report --hard-set sphere --planes query --ray-kinds random,vertex --rays 3000 --timed-rays 50 --out r",
+    );
     assert_eq!(text(&printed).trim(), std::path::Path::new("r").join("report.md").to_str().unwrap());
     let names: BTreeSet<String> = fs::read_dir(workshop.path("r"))
         .unwrap()
@@ -113,18 +114,43 @@ fn models_are_measured_and_the_json_is_documented() {
     let workshop = Workshop::new();
     let report: Value =
         serde_json::from_slice(&workshop.succeed("report model.obj --rays 200 --repeat 0 --json")).unwrap();
+    for (table, rows) in [("spawn", 15), ("image", 8)] {
+        assert_eq!(report["subjects"][0][table].as_array().unwrap().len(), rows, "{table}");
+    }
+    assert_eq!(
+        (report["spheres"].as_array().unwrap().len(), report["light_paths"].as_array().unwrap().len()),
+        (24, 35)
+    );
+    for row in report["subjects"][0]["spawn"].as_array().unwrap().iter().filter(|row| row["default"] == true) {
+        assert_eq!(row["self_hits"]["wrong"], 0, "{row}");
+    }
     assert_eq!((&report["schema"], &report["complete"]), (&1.into(), &true.into()));
     assert_eq!((&report["subjects"][0]["name"], &report["subjects"][0]["triangles"]), (&"model".into(), &13.into()));
     assert!(rows(&report, "query").iter().all(|row| row["mrays_per_s"].is_null()));
     assert_eq!(rows(&report, "ray_sets").len(), 8);
     let tables = [report["environment"].clone(), report["subjects"][0].clone()];
-    let lists = ["ray_sets", "query", "accuracy"].map(|table| rows(&report, table)[0].clone());
-    for object in [&report].into_iter().chain(&tables).chain(&lists) {
+    let lists = ["ray_sets", "query", "accuracy", "spawn", "image"].map(|table| rows(&report, table)[0].clone());
+    let own = ["spheres", "light_paths"].map(|table| report[table][0].clone());
+    for object in [&report].into_iter().chain(&tables).chain(&lists).chain(&own) {
         for key in object.as_object().unwrap().keys() {
             assert!(MANUAL.contains(&format!("`{key}`")), "`{key}` is not in the manual");
         }
     }
     assert_eq!(workshop.names().len(), 2, "nothing was written: {:?}", workshop.names());
+}
+
+#[test]
+fn rays_of_a_file_are_asked_alone() {
+    let workshop = Workshop::new();
+    workshop.write("rays.txt", "0.5 3 0.5 0 -1 0\n-0.5 3 -0.5 0 -1 0\n9 9 9 1 0 0\n");
+    let arguments = "report model.obj --planes query --ray-file rays.txt --repeat 0 --json";
+    let report: Value = serde_json::from_slice(&workshop.succeed(arguments)).unwrap();
+    let sets = rows(&report, "ray_sets");
+    assert_eq!((sets.len(), &sets[0]["ray_kind"], &sets[0]["rays"]), (1, &"file".into(), &3.into()));
+    assert_eq!(sets[0]["exact_hits"], 2);
+    assert!(rows(&report, "query").iter().all(|row| row["hits"] == 2 && wrong(row) == 0));
+    workshop.write("rays.txt", "0.5 3 0.5 0 -1 0\n1 2 x 0 0 1\n");
+    assert!(workshop.fail(arguments).contains("rays.txt:2:5: "));
 }
 
 #[test]

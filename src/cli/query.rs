@@ -76,7 +76,8 @@ pub enum Precision {
     Exact,
 }
 
-const FORMATS: [(&str, RecordFormat); 2] = [("text", RecordFormat::Text), ("f32", RecordFormat::F32)];
+/// The formats of rays.
+pub(super) const FORMATS: [(&str, RecordFormat); 2] = [("text", RecordFormat::Text), ("f32", RecordFormat::F32)];
 const MODES: [(&str, Mode); 3] = [("closest", Mode::Closest), ("occluded", Mode::Occluded), ("all", Mode::All)];
 const PRECISIONS: [(&str, Precision); 2] = [("f32", Precision::F32), ("exact", Precision::Exact)];
 
@@ -133,7 +134,7 @@ pub fn run(arguments: &QueryArguments) -> Result<()> {
 }
 
 /// A file of rays, and how long it is; 0 for what has no length, such as a pipe.
-fn open<'a>(path: &Path) -> Result<(Box<dyn Read + 'a>, u64)> {
+pub(super) fn open<'a>(path: &Path) -> Result<(Box<dyn Read + 'a>, u64)> {
     let system = |cause: io::Error| match cause.kind() {
         ErrorKind::NotFound => Error::caller("there is no such file").at_path(path),
         _ => Error::system(path, cause),

@@ -6,17 +6,20 @@ use std::process::Command;
 
 use clap::{Args, ValueHint};
 
+use super::query::{FORMATS, open};
 use super::terminal::{self, Terminal};
 use super::values::{self, one_of};
 use super::{arguments, ledger};
 use crate::error::{Error, Fault, Result};
 use crate::formats::atomic_file::{check_writable, write_atomically};
 use crate::formats::{self, Loaded};
+use crate::measure::ray_file::{FileRay, RayReader, RecordFormat};
 use crate::measure::report::environment::Environment;
 use crate::measure::report::query::Effort;
+use crate::measure::report::ray_set::{Group, Question, RaySet};
 use crate::measure::report::rays::{RayKind, SEED};
 use crate::measure::report::subject::{HardSet, Subject};
-use crate::measure::report::{self, Options, Report};
+use crate::measure::report::{self, Options, Plane, Report};
 use crate::measure::speed::FEWEST_REPETITIONS;
 
 /// Flags of `report`.
@@ -35,9 +38,18 @@ pub struct ReportArguments {
     /// Print the report as one JSON document and write no files, unless --out is given.
     #[arg(long)]
     pub json: bool,
-    /// Rays to make, with commas between; all kinds if it is not given.
+    /// What to measure, with commas between; everything if it is not given.
+    #[arg(long, value_name = "PLANES", value_delimiter = ',', value_parser = one_of(planes()))]
+    pub planes: Vec<Plane>,
+    /// Rays to make, with commas between; without it all kinds, or none where --ray-file is given.
     #[arg(long, value_name = "KINDS", value_delimiter = ',', value_parser = one_of(ray_kinds()))]
     pub ray_kinds: Vec<RayKind>,
+    /// Also ask these rays, in the coordinates of each input.
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub ray_file: Option<PathBuf>,
+    /// How the ray file is written: text, one ray a line, or little-endian 32-bit words, eight a ray.
+    #[arg(long, value_name = "FORMAT", value_parser = one_of(FORMATS), default_value = "text", requires = "ray_file")]
+    pub format: RecordFormat,
     /// Rays of each kind whose answers are judged; the smallest rate that can be told from 0 is about 3 over this.
     #[arg(long, value_name = "N", value_parser = values::count(1..=MOST_RAYS), default_value_t = 50_000)]
     pub rays: u32,
@@ -60,6 +72,10 @@ const MOST_RAYS: u32 = 10_000_000;
 
 fn hard_sets() -> impl Iterator<Item = (&'static str, HardSet)> {
     HardSet::ALL.into_iter().map(|set| (set.name(), set))
+}
+
+fn planes() -> impl Iterator<Item = (&'static str, Plane)> {
+    Plane::ALL.into_iter().map(|plane| (plane.name(), plane))
 }
 
 fn ray_kinds() -> impl Iterator<Item = (&'static str, RayKind)> {
@@ -94,12 +110,20 @@ pub fn run(arguments: &ReportArguments) -> Result<()> {
     }
     super::use_threads(arguments.threads)?;
     let terminal = Terminal::new(false)?;
+    let file_rays = arguments.ray_file.as_deref().map(|path| read_rays(path, arguments.format)).transpose()?;
     let options = options(arguments);
     let mut report = Report::new(Environment::detect(commit(), SEED), &options);
     let mut stopped = None;
     for part in parts(arguments) {
-        let measured =
-            part.load(arguments, &terminal).and_then(|subject| report::measure(&subject, &[], &options, &terminal));
+        let measured = part.load(arguments, &terminal).and_then(|subject| {
+            let given = file_rays.as_ref().map(|rays| RaySet {
+                name: "file".into(),
+                group: Group::Generic,
+                question: Question::Closest,
+                rays: rays.iter().map(|ray| subject.ray(ray)).collect(),
+            });
+            report::measure(&subject, given.as_slice(), &options, &terminal)
+        });
         terminal.clear();
         match measured {
             Ok(part) => report.subjects.push(part),
@@ -108,6 +132,10 @@ pub fn run(arguments: &ReportArguments) -> Result<()> {
                 break;
             }
         }
+    }
+    if stopped.is_none() {
+        stopped = report.measure_own_scenes(&options, &terminal).err();
+        terminal.clear();
     }
     report.complete = stopped.is_none();
     if let Some(error) = stopped.take_if(|error| error.fault() != Fault::Cancelled || report.subjects.is_empty()) {
@@ -164,11 +192,31 @@ fn first_name(arguments: &ReportArguments) -> String {
 }
 
 fn options(arguments: &ReportArguments) -> Options {
-    let wanted = |kind: &RayKind| arguments.ray_kinds.is_empty() || arguments.ray_kinds.contains(kind);
+    let all = arguments.ray_kinds.is_empty() && arguments.ray_file.is_none();
+    let wanted = |kind: &RayKind| all || arguments.ray_kinds.contains(kind);
+    let measured = |plane: &Plane| arguments.planes.is_empty() || arguments.planes.contains(plane);
     Options {
+        planes: Plane::ALL.into_iter().filter(measured).collect(),
         kinds: RayKind::ALL.into_iter().filter(wanted).collect(),
         rays: arguments.rays as usize,
         effort: Effort { rays_timed: arguments.timed_rays as usize, repetitions: arguments.repeat },
+    }
+}
+
+/// All rays of a file.
+fn read_rays(path: &Path, format: RecordFormat) -> Result<Vec<FileRay>> {
+    let mut reader = RayReader::new(open(path)?.0, format, path);
+    let (mut all, mut some) = (Vec::new(), Vec::new());
+    loop {
+        reader.read(&mut some, 1 << 16)?;
+        if some.is_empty() {
+            return Ok(all);
+        }
+        all.append(&mut some);
+        if all.len() > MOST_RAYS as usize {
+            let message = format!("there are more than the {MOST_RAYS} rays that a report holds");
+            return Err(Error::limit(message).at_path(path).remedy("split the file"));
+        }
     }
 }
 

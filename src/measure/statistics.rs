@@ -91,6 +91,13 @@ pub struct Median {
     pub high: f64,
 }
 
+impl Median {
+    /// In another unit: everything times a number above 0.
+    pub fn times(self, factor: f64) -> Self {
+        Self { value: self.value * factor, low: self.low * factor, high: self.high * factor }
+    }
+}
+
 /// The median of repeated measurements with its bootstrap interval (Efron 1979; 1000 resamples, percentiles).
 pub fn median(values: &[f64]) -> Median {
     let middle = |values: &mut [f64]| {

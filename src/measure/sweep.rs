@@ -49,6 +49,17 @@ pub struct Cost {
     pub error: f64,
 }
 
+impl Cost {
+    /// What takes some time each; the shorter the better. Times that were not measured are all alike.
+    pub fn of_time(time: Option<Median>, error: f64) -> Self {
+        let rate = |seconds: f64| 1.0 / seconds;
+        let untimed = Median { value: 0.0, low: 0.0, high: 0.0 };
+        let speed =
+            time.map_or(untimed, |time| Median { value: rate(time.value), low: rate(time.high), high: rate(time.low) });
+        Self { speed, error }
+    }
+}
+
 /// Which choices are dominated: another one is no worse in both and better in one.
 ///
 /// Speeds whose intervals overlap are equal, so that noise dominates nobody. NaN errors dominate nothing and are

@@ -161,10 +161,7 @@ fn ns_per_ray(rows: &[QueryRow], group: Group, name: &str) -> Option<Median> {
 }
 
 fn cost(row: &AccuracyRow) -> Cost {
-    let untimed = Median { value: 0.0, low: 0.0, high: 0.0 };
-    let speed =
-        row.ns_per_ray.map_or(untimed, |ns| Median { value: 1.0 / ns.value, low: 1.0 / ns.high, high: 1.0 / ns.low });
-    Cost { speed, error: row.t_normalized.p99_99 }
+    Cost::of_time(row.ns_per_ray, row.t_normalized.p99_99)
 }
 
 /// The distance of f32 numbers at a value.

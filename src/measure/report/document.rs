@@ -4,9 +4,12 @@ use std::fmt::Write as _;
 
 use super::accuracy::{AccuracyRow, Spread};
 use super::environment::Environment;
-use super::pictures::name;
+use super::image::{CONVERGED_SAMPLES, ErrorKind};
+use super::own_scenes;
+use super::pictures::{image_name, name};
 use super::query::QueryRow;
 use super::ray_set::{Group, Question};
+use super::spawn::SpawnRow;
 use super::{File, Report, SubjectReport};
 use crate::measure::statistics::{Median, rate_bound};
 use crate::measure::table::Table;
@@ -22,8 +25,10 @@ pub fn markdown(report: &Report, pictures: &[File]) -> String {
     page += &measured_on(report);
     for subject in &report.subjects {
         let _ = writeln!(page, "\n## {}\n", subject.name);
-        page += &of_subject(subject, report, pictures);
+        page += &of_subject(subject, pictures);
     }
+    page += &own_scenes::spheres(&report.spheres, pictures);
+    page += &own_scenes::light_paths(&report.light_paths);
     page
 }
 
@@ -53,13 +58,18 @@ fn measured_on(report: &Report) -> String {
     table.to_string()
 }
 
-fn of_subject(subject: &SubjectReport, report: &Report, pictures: &[File]) -> String {
+fn of_subject(subject: &SubjectReport, pictures: &[File]) -> String {
     let mut text = format!("{} triangles.", subject.triangles);
     if subject.quadrics_left_out > 0 {
         let _ = write!(text, " {} quadrics are left out of these rays.", subject.quadrics_left_out);
     }
     text += "\n\n";
     text += &conclusion(subject);
+    if subject.query.is_empty() {
+        text += &spawn_section(&subject.spawn);
+        text += &image_section(subject, pictures);
+        return text;
+    }
     text += "\n### What was compared\n\n";
     text += &choices_table(subject).to_string();
     text += "\n### Rays\n\n";
@@ -95,7 +105,8 @@ fn of_subject(subject: &SubjectReport, report: &Report, pictures: &[File]) -> St
             text += &accuracy_table(&rows).to_string();
         }
     }
-    let _ = report;
+    text += &spawn_section(&subject.spawn);
+    text += &image_section(subject, pictures);
     text
 }
 
@@ -166,7 +177,7 @@ fn query_table(rows: &[&QueryRow]) -> Table {
             row.borderline.to_string(),
             row.hits.to_string(),
             row.hit_hash.clone(),
-            if row.dominated { "yes" } else { "**no**" }.into(),
+            yes_or_no(row.dominated),
         ]);
     }
     table
@@ -193,13 +204,89 @@ fn accuracy_table(rows: &[&AccuracyRow]) -> Table {
             spread(&row.t_normalized),
             spread(&row.barycentric),
             spread(&row.normal_angle),
-            if row.dominated { "yes" } else { "**no**" }.into(),
+            yes_or_no(row.dominated),
         ]);
     }
     table
 }
 
-fn interval(speed: Median) -> String {
+fn spawn_section(rows: &[SpawnRow]) -> String {
+    let headings = [
+        "place",
+        "start",
+        ">ns a start",
+        ">self-hits in 1e9",
+        ">starts below the surface in 1e9",
+        ">mean clearance, ulp",
+        "dominated",
+    ];
+    let mut table = Table::new(&headings);
+    for row in rows {
+        table.push(vec![
+            row.place.into(),
+            row.name.into(),
+            row.ns_per_start.map_or("not timed".into(), interval),
+            row.self_hits.to_string(),
+            row.below.to_string(),
+            short(row.mean_clearance_ulp),
+            yes_or_no(row.dominated),
+        ]);
+    }
+    if table.is_empty() {
+        return String::new();
+    }
+    format!(
+        "\n### Rays that leave a surface\n\nFrom random points of triangles, away from them in random directions: a hit on \
+         the same triangle is wrong. The renderer's start comes with all that shading needs of the point; the others' \
+         times are of the start alone.\n\n{table}"
+    )
+}
+
+fn image_section(subject: &SubjectReport, pictures: &[File]) -> String {
+    let mut text = String::new();
+    for (kind, heading, what) in [
+        (
+            ErrorKind::Numeric,
+            "Image plane, numeric error",
+            "Against the same samples in f64 with exact hits: what f32 changes.".to_owned(),
+        ),
+        (
+            ErrorKind::Sampling,
+            "Image plane, sampling error",
+            format!("Against {CONVERGED_SAMPLES} samples a pixel in f32: what too few samples change."),
+        ),
+    ] {
+        let headings =
+            ["samples", ">seconds", ">RMSE", ">largest error", ">wrong pixels", ">pixels", ">seconds of the reference"];
+        let mut table = Table::new(&headings);
+        for row in subject.image.iter().filter(|row| row.error == kind) {
+            table.push(vec![
+                row.samples.to_string(),
+                row.seconds.map_or("not timed".into(), |s| interval(s.times(1e3)) + " ms"),
+                short(row.rmse),
+                short(row.max),
+                row.wrong_pixels.to_string(),
+                row.pixels.to_string(),
+                format!("{:.3}", row.reference_seconds),
+            ]);
+        }
+        if !table.is_empty() {
+            let _ = writeln!(text, "\n### {heading}\n\n{what} Colours are linear; a pixel is wrong from 1/255 on.\n");
+            if kind == ErrorKind::Sampling {
+                text += &picture(&image_name(&subject.name), pictures);
+                text.push('\n');
+            }
+            text += &table.to_string();
+        }
+    }
+    text
+}
+
+fn yes_or_no(dominated: bool) -> String {
+    if dominated { "yes" } else { "**no**" }.into()
+}
+
+pub(super) fn interval(speed: Median) -> String {
     // Three digits at least; the ends with the same number of decimals.
     let decimals = if speed.value >= 100.0 {
         0
@@ -212,16 +299,18 @@ fn interval(speed: Median) -> String {
     format!("{value:.decimals$} ({low:.decimals$} to {high:.decimals$})")
 }
 
-fn spread(errors: &Spread) -> String {
-    let short = |x: f64| {
-        if x == 0.0 {
-            "0".into()
-        } else if (0.01..1000.0).contains(&x) {
-            format!("{x:.2}")
-        } else {
-            format!("{x:.1e}")
-        }
-    };
+/// Two decimals, or two digits with a power of ten.
+pub(super) fn short(x: f64) -> String {
+    if x == 0.0 {
+        "0".into()
+    } else if (0.01..1000.0).contains(&x.abs()) {
+        format!("{x:.2}")
+    } else {
+        format!("{x:.1e}")
+    }
+}
+
+pub(super) fn spread(errors: &Spread) -> String {
     [errors.p50, errors.p99, errors.p99_99, errors.max].map(short).join(" / ")
 }
 
@@ -232,7 +321,7 @@ fn question(question: Question) -> &'static str {
     }
 }
 
-fn picture(name: &str, pictures: &[File]) -> String {
+pub(super) fn picture(name: &str, pictures: &[File]) -> String {
     let exists = pictures.iter().any(|file| file.name == name);
     if exists { format!("![{name}]({name})\n") } else { String::new() }
 }

@@ -5,7 +5,7 @@
 //! an edge is right, a closed surface never lets it through, and at the rim of the surface as the ray sees it (an open
 //! edge, or one where the surface turns away) a hit or a miss is borderline. All else is exact.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use glam::{DVec3, Vec3};
 
@@ -124,8 +124,12 @@ impl<'a> Judge<'a> {
         let Some(truth) = truth else { return Verdict::Borderline };
         let reach = 2.0 * near.max(self.near(&line, truth.primitive));
         let cosine = self.cosine_to(&line, answered).min(self.cosine_to(&line, truth.primitive));
+        let (around, at_rim) = self.surroundings(&line, truth.primitive, 0.5 * reach);
         if (place - truth.t).abs() * line.length * cosine <= reach {
             Verdict::Right
+        } else if around.contains(&answered) {
+            // A line moved by no more than rounding passes from the one to the other without leaving the surface.
+            if at_rim { Verdict::Borderline } else { Verdict::Right }
         } else if place < truth.t {
             Verdict::Borderline
         } else {
@@ -139,55 +143,55 @@ impl<'a> Judge<'a> {
         let certain = self.oracle.all(ray).iter().map(Truth::from).take_while(|truth| truth.t < until).any(|truth| {
             let near = self.near(&line, truth.primitive);
             let from_end = (f64::from(ray.t_max) - truth.t) * line.length * self.cosine_to(&line, truth.primitive);
-            from_end > 2.0 * near && !self.at_rim(&line, truth.primitive, near)
+            from_end > 2.0 * near && !self.surroundings(&line, truth.primitive, near).1
         });
         if certain { Verdict::Missed } else { Verdict::Borderline }
     }
 
-    /// Whether a line that meets a triangle passes near to the rim of the surface around it, as the line sees it.
+    /// The triangles around one that a line meets, from edge to edge as long as the line passes near to them, and whether
+    /// one of these edges is at the rim of the surface as the line sees it.
     ///
-    /// Where the surface is seen nearly edge-on, the rim may be several triangles away and yet near: the search goes on
-    /// from edge to edge as long as they are near.
-    fn at_rim(&self, line: &Line, triangle: u32, near: f64) -> bool {
-        let mut seen = vec![triangle];
-        let mut next = 0;
-        while next < seen.len() {
-            let corners = self.mesh.triangle(seen[next]);
-            next += 1;
+    /// Where the surface is seen nearly edge-on, these may be several triangles in a row.
+    fn surroundings(&self, line: &Line, triangle: u32, near: f64) -> (HashSet<u32>, bool) {
+        let mut seen = HashSet::from([triangle]);
+        let mut pending = vec![triangle];
+        let mut at_rim = false;
+        while let Some(next) = pending.pop() {
+            let corners = self.mesh.triangle(next);
             for (a, b) in [(0, 1), (1, 2), (2, 0)].map(|(from, to)| (corners[from], corners[to])) {
                 let [from, to] = [a, b].map(|end| end.as_dvec3() - line.origin);
                 if distance(line, from, to).0 > near {
                     continue;
                 }
-                if self.is_rim(line, a, b) {
-                    return true;
-                }
+                at_rim |= self.is_rim(line, a, b);
                 for neighbour in [a, b].iter().flat_map(|end| &self.around[&key(*end)]) {
-                    if !seen.contains(neighbour) {
-                        seen.push(*neighbour);
+                    if seen.insert(*neighbour) {
+                        pending.push(*neighbour);
                     }
                 }
             }
         }
-        false
+        (seen, at_rim)
     }
 
-    /// Whether the surface ends at an edge as a line sees it: all triangles there lie on one side.
+    /// Whether the surface ends at an edge as a line sees it: a single triangle is there, or all lie on one side. One that
+    /// is seen exactly edge-on lies on both.
     fn is_rim(&self, line: &Line, a: Vec3, b: Vec3) -> bool {
         let across = cross(line.direction, b.as_dvec3() - a.as_dvec3());
-        let (mut one, mut other) = (false, false);
+        let (mut count, mut one, mut other) = (0, false, false);
         for &triangle in &self.around[&key(a)] {
             let corners = self.mesh.triangle(triangle);
             if !corners.iter().any(|corner| key(*corner) == key(b)) {
                 continue;
             }
+            count += 1;
             for corner in corners.iter().filter(|corner| key(**corner) != key(a) && key(**corner) != key(b)) {
                 let side = dot(across, corner.as_dvec3() - a.as_dvec3());
-                one |= side > 0.0;
-                other |= side < 0.0;
+                one |= side >= 0.0;
+                other |= side <= 0.0;
             }
         }
-        !(one && other)
+        count == 1 || !(one && other)
     }
 
     /// What counts as near for a triangle, as a distance.
@@ -289,6 +293,30 @@ mod tests {
         assert_eq!(judge(inside, 0.5, Some(0)), Verdict::Right);
         assert_eq!(judge(outside, 0.5, Some(0)), Verdict::Borderline);
         assert_eq!(judge(1.0 - 1e-4, 0.5, None), Verdict::Missed);
+    }
+
+    #[test]
+    fn the_far_side_of_a_triangle_seen_edge_on_is_a_neighbour() {
+        // Found on the sphere far from zero: the exact ray meets a step's near side one ulp from its edge; the step
+        // itself is seen edge-on, and f32 sees the wall at its other end.
+        let edge = [[1.0, -1.0, 1.0], [1.0, 1.0, 1.0], [1.0, -1.0, 2.0], [1.0, 1.0, 2.0]].map(Vec3::from);
+        let ends = [[0.0, -1.0, 1.0], [0.0, 1.0, 1.0], [2.0, -1.0, 2.0], [2.0, 1.0, 2.0]].map(Vec3::from);
+        let positions = edge.into_iter().chain(ends).collect();
+        let indices = vec![[0, 1, 4], [1, 5, 4], [0, 2, 1], [1, 2, 3], [2, 6, 3], [3, 6, 7]];
+        let mesh = TriangleMesh { positions, indices, ..TriangleMesh::default() };
+        let scene = of_mesh(mesh.finish().unwrap());
+        let oracle = Oracle::new(&scene).unwrap();
+        let judge = Judge::new(&scene.meshes[0], &oracle);
+        let verdict = |x: f32, primitive: u32| {
+            let ray = Ray::new(Vec3::new(x, 0.25, 0.0), Vec3::Z);
+            let hit = Hit { t: 2.0, instance: 0, primitive, ..Hit::MISS };
+            judge.closest(&ray, judge.truth(&ray).as_ref(), &hit)
+        };
+        let inside = 1.0f32.next_down();
+        assert_eq!(judge.truth(&Ray::new(Vec3::new(inside, 0.25, 0.0), Vec3::Z)).unwrap().t, 1.0);
+        assert_eq!(verdict(inside, 4), Verdict::Right);
+        assert_eq!(verdict(0.999, 4), Verdict::False);
+        assert_eq!(verdict(inside, 5), Verdict::False);
     }
 
     #[test]

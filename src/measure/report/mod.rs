@@ -11,33 +11,86 @@ pub mod accuracy;
 pub mod choices;
 mod document;
 pub mod environment;
+pub mod image;
 pub mod judge;
+mod own_scenes;
 mod pictures;
 pub mod query;
 pub mod ray_set;
 pub mod rays;
+pub mod spawn;
+pub mod spheres;
 pub mod subject;
 
 use crate::accel::Params;
 use crate::error::Result;
+use crate::measure::light_paths::{self, DISTANCES, LightPaths, SCALES};
 use crate::measure::oracle::Oracle;
 use crate::progress::Progress;
 use crate::render::Renderer;
 
 use accuracy::{Accuracy, AccuracyRow};
 use environment::Environment;
+use image::ImageRow;
 use judge::Judge;
 use query::{Effort, QueryRow};
 use ray_set::{Group, Question, RaySet};
 use rays::RayKind;
+use spawn::SpawnRow;
+use spheres::SphereRow;
 use subject::Subject;
 
 /// The `schema` of the JSON: raised when a reader would break.
 pub const SCHEMA: u32 = 1;
 
+/// A part of a report: one kind of speed against one kind of error.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Plane {
+    /// Rays a second against wrong answers, and time a ray against the error of hits.
+    Query,
+    /// Where rays leave a surface: time against self-hits.
+    Spawn,
+    /// The time of a picture against its error.
+    Image,
+    /// Formulas for quadrics, on a sphere of the report's own.
+    Quadric,
+    /// Shadows and mirrors against closed forms, on scenes of the report's own.
+    Light,
+}
+
+impl Plane {
+    /// All of them.
+    pub const ALL: [Self; 5] = [Self::Query, Self::Spawn, Self::Image, Self::Quadric, Self::Light];
+
+    /// The name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Query => "query",
+            Self::Spawn => "spawn",
+            Self::Image => "image",
+            Self::Quadric => "quadric",
+            Self::Light => "light",
+        }
+    }
+}
+
+/// Points for acne and for leaks at each scale and distance.
+const LIGHT_POINTS: u64 = 1000;
+
+/// Passes on a cancellation and no progress: for many small builds in a row.
+struct Quiet<'a>(&'a dyn Progress);
+
+impl Progress for Quiet<'_> {
+    fn is_cancelled(&self) -> bool {
+        self.0.is_cancelled()
+    }
+}
+
 /// What to measure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Options {
+    /// Which parts.
+    pub planes: Vec<Plane>,
     /// Which rays to make.
     pub kinds: Vec<RayKind>,
     /// How many of each kind.
@@ -63,6 +116,10 @@ pub struct Report {
     pub repetitions: u32,
     /// The parts, one a scene.
     pub subjects: Vec<SubjectReport>,
+    /// The accuracy of quadrics.
+    pub spheres: Vec<SphereRow>,
+    /// Shadows and mirrors at several scales and distances from zero.
+    pub light_paths: Vec<LightPaths>,
 }
 
 /// What was measured on one scene.
@@ -80,6 +137,10 @@ pub struct SubjectReport {
     pub query: Vec<QueryRow>,
     /// The accuracy plane: a row a choice and group.
     pub accuracy: Vec<AccuracyRow>,
+    /// Where rays leave surfaces: a row a place and way.
+    pub spawn: Vec<SpawnRow>,
+    /// The image plane: a row an error and number of samples.
+    pub image: Vec<ImageRow>,
 }
 
 /// What a set of rays is.
@@ -120,7 +181,28 @@ impl Report {
             rays_timed: rays_timed.min(options.rays),
             repetitions,
             subjects: Vec::new(),
+            spheres: Vec::new(),
+            light_paths: Vec::new(),
         }
+    }
+
+    /// Measures what needs no scene of the user's.
+    ///
+    /// # Errors
+    /// A cancellation.
+    pub fn measure_own_scenes(&mut self, options: &Options, progress: &dyn Progress) -> Result<()> {
+        if options.planes.contains(&Plane::Quadric) {
+            self.spheres = spheres::measure(options.effort.rays_timed, options.effort.repetitions, progress)?;
+        }
+        if options.planes.contains(&Plane::Light) {
+            progress.begin("light", (SCALES.len() * DISTANCES.len()) as u64);
+            for (scale, distance) in SCALES.into_iter().flat_map(|s| DISTANCES.map(|d| (s, d))) {
+                let params = Params::default();
+                self.light_paths.push(light_paths::measure(&params, scale, distance, LIGHT_POINTS, &Quiet(progress))?);
+                progress.advance(1);
+            }
+        }
+        Ok(())
     }
 
     /// The report as JSON.
@@ -148,6 +230,37 @@ pub fn measure(
     options: &Options,
     progress: &dyn Progress,
 ) -> Result<SubjectReport> {
+    let mut report = SubjectReport {
+        name: subject.name.clone(),
+        triangles: subject.mesh().live_count(),
+        quadrics_left_out: subject.quadrics,
+        ray_sets: Vec::new(),
+        query: Vec::new(),
+        accuracy: Vec::new(),
+        spawn: Vec::new(),
+        image: Vec::new(),
+    };
+    for plane in &options.planes {
+        match plane {
+            Plane::Query => measure_query(subject, given, options, &mut report, progress)?,
+            Plane::Spawn => {
+                report.spawn = spawn::measure(subject, options.rays, options.effort.repetitions, progress)?;
+            }
+            Plane::Image => report.image = image::measure(subject, options.effort.repetitions, progress)?,
+            Plane::Quadric | Plane::Light => {}
+        }
+    }
+    Ok(report)
+}
+
+/// The query and the accuracy plane.
+fn measure_query(
+    subject: &Subject,
+    given: &[RaySet],
+    options: &Options,
+    report: &mut SubjectReport,
+    progress: &dyn Progress,
+) -> Result<()> {
     let mesh = subject.mesh();
     let oracle = Oracle::new(&subject.scene)?;
     let judge = Judge::new(mesh, &oracle);
@@ -155,14 +268,6 @@ pub fn measure(
     let choices = choices::all(&subject.scene, &skeleton, seconds, progress)?;
     let renderer = Renderer::build(subject.scene.clone(), &Params::default(), progress)?;
 
-    let mut report = SubjectReport {
-        name: subject.name.clone(),
-        triangles: mesh.live_count(),
-        quadrics_left_out: subject.quadrics,
-        ray_sets: Vec::new(),
-        query: Vec::new(),
-        accuracy: Vec::new(),
-    };
     let mut accuracy = Accuracy::new(mesh, &judge, choices.len());
     let made = options.kinds.iter().map(|kind| kind.rays(&renderer, options.rays)).collect::<Result<Vec<_>>>()?;
     for set in made.iter().chain(given).filter(|set| !set.rays.is_empty()) {
@@ -179,5 +284,5 @@ pub fn measure(
         });
     }
     report.accuracy = accuracy.rows(&choices, &report.query);
-    Ok(report)
+    Ok(())
 }

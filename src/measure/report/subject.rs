@@ -3,10 +3,11 @@
 use glam::{DAffine3, DVec3};
 
 use crate::error::{Error, Result};
-use crate::geometry::TriangleMesh;
+use crate::geometry::{Ray, TriangleMesh};
 use crate::math::random::Random;
 use crate::math::vector::basis;
 use crate::measure::cases::meshes;
+use crate::measure::ray_file::FileRay;
 use crate::render::world::World;
 use crate::scene::{Camera, LightKind, NamedCamera, Object, Projection, Scene, Shape, auto};
 
@@ -24,6 +25,8 @@ pub struct Subject {
     pub original: Scene,
     /// Quadrics of the original, which are not in the mesh.
     pub quadrics: usize,
+    /// The length of 1 of the mesh's coordinates in those of the original: a power of two, nearly always 1.
+    unit: f64,
 }
 
 /// Meshes that are made to be hard.
@@ -81,7 +84,7 @@ impl Subject {
     pub fn hard(set: HardSet) -> Self {
         let mut scene = of_mesh(set.mesh());
         auto::complete(&mut scene);
-        Self { name: set.name().into(), original: scene.clone(), scene, quadrics: 0 }
+        Self { name: set.name().into(), original: scene.clone(), scene, quadrics: 0, unit: 1.0 }
     }
 
     /// The triangles of a loaded scene, every instance brought into the world in f64 and rounded once: exactly the
@@ -127,7 +130,14 @@ impl Subject {
         }
         scene.film = original.film;
         auto::complete(&mut scene);
-        Ok(Self { name, quadrics: original.quadrics.len(), scene, original })
+        Ok(Self { name, quadrics: original.quadrics.len(), scene, original, unit })
+    }
+
+    /// A ray in the file's coordinates as the mesh has it.
+    pub fn ray(&self, ray: &FileRay) -> Ray {
+        let relative = FileRay { origin: (ray.origin - self.original.origin) / self.unit, ..*ray };
+        let Ray { origin, t_min, direction, t_max } = relative.relative_to(DVec3::ZERO);
+        Ray { origin, t_min, direction: (direction.as_dvec3() / self.unit).as_vec3(), t_max }
     }
 
     /// The one mesh.
@@ -178,6 +188,18 @@ mod tests {
         let lifted = grid.triangle(7).map(|p| glam::Vec3::new(p.x, p.y + 0.3, p.z));
         assert_eq!(subject.mesh().triangle(20_007), lifted);
         assert!(!subject.scene.lights.is_empty() && !subject.scene.cameras.is_empty());
+    }
+
+    #[test]
+    fn rays_of_files_meet_what_they_meet_in_the_file() {
+        let far = DVec3::new(5e6, 4e6, 100.0);
+        let mut scene = of_mesh(TriangleMesh { origin: far, ..meshes::grid(2) });
+        scene.origin = far;
+        let subject = Subject::of_scene("far".into(), scene).unwrap();
+        let origin = far + DVec3::new(0.25, 0.5, 1.0);
+        let ray = FileRay { origin, direction: -glam::Vec3::Z, t_min: 0.0, t_max: 2.0 };
+        let expected = Ray { t_max: 2.0, ..Ray::new(glam::Vec3::new(0.25, 0.5, 1.0), -glam::Vec3::Z) };
+        assert_eq!(subject.ray(&ray), expected);
     }
 
     #[test]
