@@ -76,7 +76,7 @@ impl Place {
             let (u, v) = (random.unit(), random.unit());
             let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
             let target = a * (1.0 - u - v) + b * u + c * v;
-            let origin = (around + random.in_cube() * bounds.size()).as_vec3();
+            let origin = (around + random.in_cube() * length(bounds.size())).as_vec3();
             let ray = Ray::new(origin, (target - origin.as_dvec3()).as_vec3());
             let hit = renderer.closest(&ray);
             if !hit.is_hit() {
@@ -190,6 +190,12 @@ mod tests {
     use super::*;
     use crate::measure::report::subject::HardSet;
     use crate::progress::Silent;
+
+    #[test]
+    fn flat_meshes_are_seen_from_outside_their_plane() {
+        let rows = measure(&Subject::hard(HardSet::Grid), 500, 0, &Silent).unwrap();
+        assert!(rows.iter().all(|row| row.self_hits.total > 100 && row.mean_clearance_ulp.is_finite()), "{rows:?}");
+    }
 
     #[test]
     fn fixed_distances_fail_away_from_zero_and_the_error_bound_does_not() {
