@@ -32,9 +32,9 @@ pub const FAR: DVec3 = DVec3::new(148_376.0, 1_234.0, -223_423.0);
 
 /// Half of the rays at the origin, half of them far away, where the vertices are rounded to 1/64 and coarser.
 ///
-/// 9024 triangles: 1e6 rays on `linear`, a hundredth, take about a minute on two cores.
+/// 9024 triangles: 5e5 rays on `linear`, a two hundredth, take about a minute on two cores.
 fn inside_a_sphere(context: &Context<'_>) -> Result<Outcome> {
-    const EACH: Rays = Rays { quick: 60_000, full: 50_000_000, linear: 100 };
+    const EACH: Rays = Rays { quick: 60_000, full: 50_000_000, linear: 200 };
     let mut sum = Outcome::default();
     for (place, center) in [(0, DVec3::ZERO), (1, FAR)] {
         let scene = meshes::scene(vec![meshes::sphere(48, 96, 2.0, center)]);
@@ -135,7 +135,7 @@ fn flat_grid(context: &Context<'_>) -> Result<Outcome> {
 /// A hit's point is computed in f32 as users do: from t, and from u and v. Its distance from the plane is counted in ulp
 /// of the largest coordinate of the point, and of the ray's origin for the former.
 fn far_spheres(context: &Context<'_>) -> Result<Outcome> {
-    const EACH: Rays = Rays { quick: 9_000, full: 12_500_000, linear: 10 };
+    const EACH: Rays = Rays { quick: 9_000, full: 12_500_000, linear: 30 };
     let mut sum = Outcome::default();
     let along = Histogram::default();
     for k in 0..8u32 {
