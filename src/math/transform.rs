@@ -19,14 +19,23 @@ impl Transform {
     /// Inverts `to_world`.
     ///
     /// # Errors
-    /// A caller's error for a matrix that is singular, or has a component that is infinite or NaN.
+    /// A caller's error for a matrix that is singular, or that rounding its numbers may have made so, or that has a
+    /// component that is infinite or NaN.
     pub fn new(to_world: DAffine3) -> Result<Self> {
         let m = to_world.matrix3;
         let (x, y, z) = (m.x_axis, m.y_axis, m.z_axis);
         let yz = cross(y, z);
         let determinant = dot(x, yz);
         let singular = || Error::caller("the transform is singular or not finite").remedy("scales must not be 0");
-        if !(to_world.is_finite() && determinant.abs() > 0.0 && determinant.abs() < f64::INFINITY) {
+        // The six products with no sign: three roundings of the matrix's numbers and five of the computation may be off
+        // by their share of this. It grows with rows and columns as the determinant does, so that flat and long
+        // objects pass.
+        let unsigned = |a: DVec3, b: DVec3| {
+            let (a, b) = (a.abs(), b.abs());
+            DVec3::new(a.y * b.z + a.z * b.y, a.z * b.x + a.x * b.z, a.x * b.y + a.y * b.x)
+        };
+        let rounding = 4.0 * f64::EPSILON * dot(x.abs(), unsigned(y, z));
+        if !(to_world.is_finite() && determinant.abs() > rounding && determinant.abs() < f64::INFINITY) {
             return Err(singular());
         }
         let inverse =
@@ -74,9 +83,11 @@ impl Transform {
     }
 
     /// A point from world to object space.
+    ///
+    /// The translation goes first: between a point and an object far away the difference is exact where products are not.
     #[inline]
     pub fn point_to_object(&self, p: DVec3) -> DVec3 {
-        point(&self.to_object, p)
+        apply(&self.to_object.matrix3, p - self.to_world.translation)
     }
 
     /// A direction from world to object space, not normalised: t is the same in both spaces.
@@ -155,6 +166,21 @@ mod tests {
         assert!(Transform::new(DAffine3::from_scale(DVec3::new(1.0, 1.0, 0.0))).is_err());
         assert!(Transform::new(DAffine3::from_translation(DVec3::new(0.0, f64::NAN, 0.0))).is_err());
         assert!(Transform::new(DAffine3::from_scale(DVec3::splat(f64::INFINITY))).is_err());
+        // One column is the sum of the others, whatever the rounded determinant is.
+        let (x, y) = (DVec3::new(0.1, 0.7, 0.3), DVec3::new(-0.4, 0.2, -0.6));
+        let flat = DMat3::from_cols(x, y, x + y);
+        assert!(Transform::new(DAffine3::from_mat3(flat)).is_err());
+        assert!(Transform::new(DAffine3::from_mat3(flat.transpose())).is_err());
+        // Flattened between two turns.
+        let (turn, back) = (rotation_xyz(DVec3::new(0.3, 1.0, 2.0)), rotation_xyz(DVec3::new(1.1, -0.2, 0.4)));
+        let squeezed = |by| DAffine3::from_mat3(turn * DMat3::from_diagonal(DVec3::new(1.0, 1.0, by)) * back);
+        assert!(Transform::new(squeezed(0.0)).is_err());
+        assert!(Transform::new(squeezed(1e-9)).is_ok());
+        // Thin and long ones are as they should be.
+        for scale in [DVec3::new(1.0, 1.0, 1e-30), DVec3::new(1e-20, 1e20, 1.0)] {
+            assert!(Transform::new(DAffine3::from_mat3(turn * DMat3::from_diagonal(scale))).is_ok());
+            assert!(Transform::new(DAffine3::from_mat3(DMat3::from_diagonal(scale) * turn)).is_ok());
+        }
     }
 
     #[test]
