@@ -95,9 +95,15 @@ impl Illumination {
     }
 }
 
-/// Direction and strength of a light at a point.
+/// Direction and strength of a light at a point; `None` for a light that is where the point is.
+///
+/// Within some roundings of f64 the two cannot be told apart: on which side of the surface the light is would be chance,
+/// and its inverse square without limit.
 fn from_point(position: DVec3, falloff: Falloff, point: &SurfacePoint) -> Option<(DVec3, f64)> {
     let offset = position - point.position;
+    if offset.abs().max_element() <= 64.0 * f64::EPSILON * position.abs().max_element() {
+        return None;
+    }
     let strength = match falloff {
         Falloff::None => 1.0,
         Falloff::InverseSquare => 1.0 / dot(offset, offset),

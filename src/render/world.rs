@@ -8,7 +8,7 @@ use crate::geometry::ray::Interval;
 use crate::geometry::{Bounds, PreparedRay};
 use crate::math::Transform;
 use crate::render::shadow::PreparedLight;
-use crate::scene::{Scene, Shape, compiled};
+use crate::scene::{Material, Rgb, Scene, Shape, compiled};
 
 /// An object as rays meet it.
 #[derive(Debug, Clone)]
@@ -46,8 +46,9 @@ impl World {
     pub fn new(scene: &Scene) -> Result<Self> {
         // Weights that were computed may exceed 1 by rounding.
         const MOST: f32 = 1.0 + 4.0 * f32::EPSILON;
-        if let Some(material) = scene.materials.iter().find(|material| (material.kr + material.kt).max_element() > MOST)
-        {
+        // NaN is not at most anything.
+        let makes_light = |material: &&Material| !(material.kr + material.kt).cmple(Rgb::splat(MOST)).all();
+        if let Some(material) = scene.materials.iter().find(makes_light) {
             let message = format!("material `{}`: kr + kt is more than 1 and would make light", material.name);
             return Err(Error::caller(message));
         }
