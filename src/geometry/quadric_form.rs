@@ -19,6 +19,9 @@ pub struct QuadricForm {
     squares: DVec3,
     linear: DVec3,
     constant: f64,
+    /// The axis k of a plane counted twice, `squares_k y_k^2 = 0`: what rounding leaves of a discriminant that is 0 on
+    /// every line must not decide whether it is met.
+    double_plane: Option<usize>,
 }
 
 /// The quadratic `a s^2 + 2 b s + c` of F along a line, s counted from the closest approach to the centre.
@@ -51,7 +54,8 @@ impl QuadricForm {
         let (mut squares, vectors) = eigen(DVec3::new(a, b, c), DVec3::new(d, e, f));
         let axes = (vectors != [DVec3::X, DVec3::Y, DVec3::Z]).then_some(vectors);
         let given = DVec3::new(g, h, i);
-        let mut form = Self { center: DVec3::ZERO, axes, squares, linear: DVec3::ZERO, constant: j };
+        let mut form =
+            Self { center: DVec3::ZERO, axes, squares, linear: DVec3::ZERO, constant: j, double_plane: None };
         let mut linear = form.to_axes(given);
 
         // Complete the square along each axis that bends; along the others the form stays linear.
@@ -68,6 +72,16 @@ impl QuadricForm {
                 if linear[k].abs() <= RANK_TOLERANCE * slope {
                     linear[k] = 0.0;
                 }
+            }
+        }
+        if linear == DVec3::ZERO
+            && let [Some(k), None, None] = bent_axes(squares)
+        {
+            // The constant is what is left of `j` and the completed square; each of them was rounded.
+            let size = j.abs() + (squares[k] * center[k] * center[k]).abs();
+            if form.constant.abs() <= 4.0 * f64::EPSILON * size {
+                form.constant = 0.0;
+                form.double_plane = Some(k);
             }
         }
         form.center = form.to_object(center);
@@ -87,25 +101,52 @@ impl QuadricForm {
         dot(self.squares * y, y) + 2.0 * dot(self.linear, y) + self.constant
     }
 
-    /// F along the object-space line `origin + t direction`; `None` for a line without direction.
+    /// F along the object-space line `origin + t direction`; `None` for a line without direction, and for one within
+    /// the surface.
     #[inline]
     pub fn along(&self, origin: DVec3, direction: DVec3) -> Option<Along> {
         let from_center = self.to_axes(origin - self.center);
         let direction = self.to_axes(direction);
-        let t0 = -dot(from_center, direction) / dot(direction, direction);
+        let mut t0 = -dot(from_center, direction) / dot(direction, direction);
         if !t0.is_finite() {
             return None;
         }
-        let start = from_center + direction * t0;
+        let mut start = from_center + direction * t0;
+        if let Some(k) = self.double_plane {
+            // Count from the plane itself, where a line meets it.
+            let crossing = -from_center[k] / direction[k];
+            if crossing.is_finite() {
+                t0 = crossing;
+                start = from_center + direction * t0;
+                start[k] = 0.0;
+            }
+        }
         let bent = self.squares * direction;
-        Some(Along {
+        let along = Along {
             t0,
             start,
             direction,
             a: dot(direction, bent),
             b: dot(start, bent) + dot(self.linear, direction),
             c: dot(self.squares * start, start) + 2.0 * dot(self.linear, start) + self.constant,
-        })
+        };
+        (!self.holds(&along, from_center)).then_some(along)
+    }
+
+    /// Whether a line lies within the surface: all three coefficients are what rounding leaves of 0.
+    fn holds(&self, along: &Along, from_center: DVec3) -> bool {
+        const ROUNDING: f64 = 8.0 * f64::EPSILON;
+        let Along { t0, start, direction, a, b, c } = *along;
+        let (curved, steep) = ((self.squares * direction).abs(), self.linear.abs());
+        if a.abs() > ROUNDING * dot(direction.abs(), curved) {
+            return false;
+        }
+        // Of each product its own rounding, and that of the start, which comes from as far away as the line does.
+        let (start, moved) = (start.abs(), (from_center.abs() + (direction * t0).abs()) * ROUNDING);
+        let slope = self.squares.abs() * start + steep;
+        b.abs() <= ROUNDING * (dot(start, curved) + dot(steep, direction.abs())) + dot(moved, curved)
+            && c.abs()
+                <= ROUNDING * (dot(slope, start) + dot(steep, start) + self.constant.abs()) + 2.0 * dot(moved, slope)
     }
 
     /// The object-space point at `s` on a line.
@@ -114,8 +155,24 @@ impl QuadricForm {
         self.center + self.to_object(along.start + along.direction * s)
     }
 
+    /// The point of the surface next to the one at `s` on a line, object space: one step of Newton's method along the
+    /// gradient, after which a plane along two axes has its points exactly there.
+    pub fn surface_point(&self, along: &Along, s: f64) -> DVec3 {
+        let y = along.start + along.direction * s;
+        let half_gradient = self.squares * y + self.linear;
+        let value = dot(self.squares * y, y) + 2.0 * dot(self.linear, y) + self.constant;
+        let step = half_gradient * (0.5 * value / dot(half_gradient, half_gradient));
+        // At a singular point there is no gradient, and near one the step is longer than what rounding can be off.
+        let longest = f64::from(f32::EPSILON) * y.abs().max_element();
+        let y = if step.abs().max_element() <= longest { y - step } else { y };
+        self.center + self.to_object(y)
+    }
+
     /// Half the gradient at `s` on a line, object space.
     pub fn gradient(&self, along: &Along, s: f64) -> DVec3 {
+        if let Some(k) = self.double_plane {
+            return self.to_object(DVec3::AXES[k]);
+        }
         self.to_object(self.squares * (along.start + along.direction * s) + self.linear)
     }
 
@@ -153,6 +210,12 @@ impl QuadricForm {
     }
 }
 
+/// The axes along which a form bends, in their order.
+fn bent_axes(squares: DVec3) -> [Option<usize>; 3] {
+    let mut bent = (0..3).filter(|&k| squares[k] != 0.0);
+    [bent.next(), bent.next(), bent.next()]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -179,6 +242,35 @@ mod tests {
             let (a, b) = (form.value(p) * naive(q), form.value(q) * naive(p));
             assert!((a - b).abs() < 1e-9 * (1.0 + form.center().length_squared()), "{seed}: {a} {b}");
             assert!(form.value(p) * naive(p) >= 0.0 || naive(p).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn planes_counted_twice_are_met_once_by_every_line() {
+        // (n.p - h)^2 = 0.
+        for seed in 0..300 {
+            let random = |k: u32| unit(hash2(seed, k)) * 2.0 - 1.0;
+            let (n, h) = (DVec3::new(random(0), random(1), random(2)), random(3) * 10.0);
+            let l = n * -h;
+            let form = QuadricForm::new([
+                n.x * n.x,
+                n.y * n.y,
+                n.z * n.z,
+                n.x * n.y,
+                n.y * n.z,
+                n.x * n.z,
+                l.x,
+                l.y,
+                l.z,
+                h * h,
+            ]);
+            let (o, d) = (DVec3::new(random(4), random(5), random(6)), DVec3::new(random(7), random(8), random(9)));
+            let along = form.along(o, d).unwrap();
+            let Roots::One(s) = solve(along.a, along.b, along.c) else { panic!("{seed}: {along:?}") };
+            let expected = (h - dot(n, o)) / dot(n, d);
+            assert!((along.t0 + s - expected).abs() < 1e-10 * (1.0 + expected.abs() / dot(n, d).abs()), "{seed}");
+            let gradient = form.gradient(&along, s);
+            assert!(gradient.cross(n).length() < 1e-12 && gradient.length() > 0.9, "{seed}: {gradient}");
         }
     }
 

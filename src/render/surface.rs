@@ -1,8 +1,9 @@
 //! What shading needs of a hit point, made once for the winner, in f64.
 
-use glam::{DVec2, DVec3, Vec3};
+use glam::{DAffine3, DVec2, DVec3, Vec3};
 
 use crate::geometry::Hit;
+use crate::math::Transform;
 use crate::math::float::{gamma, round_down, round_up};
 use crate::math::vector::{cross, dot, length, normalize};
 use crate::render::world::{Instance, World};
@@ -45,6 +46,8 @@ struct LocalPoint {
     smooth: Option<DVec3>,
     /// How far along the normal an intersection may be off.
     error: f64,
+    /// Whether the ray came from outside, where that is known better than by the normal.
+    from_outside: Option<bool>,
     place: Place,
 }
 
@@ -64,7 +67,8 @@ impl SurfacePoint {
                 let weights = refined_weights(instance, ray, hit, corners);
                 let [wa, wb, wc] = weights;
                 let [a, b, c] = corners;
-                let position = a * wa + b * wb + c * wc;
+                // From one corner, so that a triangle in a plane along two axes has its points exactly there.
+                let position = a + (b - a) * wb + (c - a) * wc;
                 let face = cross(b - a, c - a);
                 let smooth = if flat || !compiled::NORMALS {
                     None
@@ -76,7 +80,8 @@ impl SurfacePoint {
                     })
                 };
                 let error = test_error(position, weights, corners, face);
-                let local = LocalPoint { position, face, smooth, error, place: Place::Weights(weights) };
+                let local =
+                    LocalPoint { position, face, smooth, error, from_outside: None, place: Place::Weights(weights) };
                 Self::placed(instance, ray, local, material)
             }
             Shape::Quadric(_) if !compiled::QUADRICS => unreachable!("this build has no quadrics"),
@@ -89,6 +94,7 @@ impl SurfacePoint {
                     face: point.normal,
                     smooth: None,
                     error: point.error,
+                    from_outside: point.from_outside,
                     place: Place::Point(point.position),
                 };
                 Self::placed(instance, ray, local, material)
@@ -98,31 +104,25 @@ impl SurfacePoint {
 
     /// Brings a point with its normals and error into the world.
     fn placed(instance: &Instance, ray: &ViewRay, local: LocalPoint, material: u32) -> Self {
-        let LocalPoint { position, face, smooth, error, place } = local;
+        let LocalPoint { position, face, smooth, error, from_outside, place } = local;
         let against = -ray.direction;
         let local_normal = normalize(face).unwrap_or(DVec3::ZERO);
-        let (world, normal, smooth, magnitude, stretch) = if instance.is_unmoved() {
-            (position, local_normal, smooth, position.abs() * gamma(1), 1.0)
+        let (world, normal, smooth, error, stretch) = if instance.is_unmoved() {
+            (position, local_normal, smooth, error, 1.0)
         } else {
             let transform = &instance.transform;
-            let m = transform.to_world();
             let normal = transform.normal_to_world(local_normal);
-            // Pharr et al. 6.8.6: transforming adds 3 gamma of the magnitudes; one more for rounding the local ray.
-            let magnitude = m.matrix3.x_axis.abs() * position.x.abs()
-                + m.matrix3.y_axis.abs() * position.y.abs()
-                + m.matrix3.z_axis.abs() * position.z.abs()
-                + m.translation.abs();
             let smooth = smooth.map(|n| transform.normal_to_world(n));
+            let error = error + dot(local_normal.abs(), there_and_back(transform, position));
             // Planes a distance 1 apart in object space are 1 / |M^-T n| apart in the world.
-            (transform.point_to_world(position), normal, smooth, magnitude * gamma(4), 1.0 / length(normal))
+            (transform.point_to_world(position), normal, smooth, error, 1.0 / length(normal))
         };
         let outward = normalize(normal).unwrap_or(against);
-        let from_outside = dot(outward, against) >= 0.0;
+        let from_outside = from_outside.unwrap_or_else(|| dot(outward, against) >= 0.0);
         let geometric_normal = if from_outside { outward } else { -outward };
         let normal = smooth.and_then(normalize).unwrap_or(geometric_normal);
         let normal = if dot(normal, geometric_normal) < 0.0 { -normal } else { normal };
-        let offset = error * stretch + dot(geometric_normal.abs(), magnitude);
-        Self { position: world, geometric_normal, normal, from_outside, material, offset, place }
+        Self { position: world, geometric_normal, normal, from_outside, material, offset: error * stretch, place }
     }
 
     /// Texture coordinates of this point, which `hit` found; the origin if its mesh has none.
@@ -139,6 +139,11 @@ impl SurfacePoint {
             }
             _ => unreachable!("the point is of another hit"),
         }
+    }
+
+    /// Whether it is on a triangle, not on a quadric.
+    pub(super) fn is_on_triangle(&self) -> bool {
+        matches!(self.place, Place::Weights(_))
     }
 
     /// Where a ray that leaves on the side of the incoming ray starts, rounded to f32 away from the surface.
@@ -166,30 +171,38 @@ impl SurfacePoint {
     }
 }
 
+/// What bringing a point of an object to the world and a ray's origin from there back to the object may lose, per axis of
+/// the object: 64 roundings in f64 of all magnitudes that take part.
+fn there_and_back(transform: &Transform, position: DVec3) -> DVec3 {
+    let magnitude = |m: &DAffine3, p: DVec3| {
+        m.matrix3.x_axis.abs() * p.x.abs()
+            + m.matrix3.y_axis.abs() * p.y.abs()
+            + m.matrix3.z_axis.abs() * p.z.abs()
+            + m.translation.abs()
+    };
+    let world = magnitude(transform.to_world(), position);
+    magnitude(transform.to_object(), world) * (64.0 * f64::EPSILON)
+}
+
 /// How far along the normal the f32 triangle test may place a hit of a ray that starts at `position` on the triangle.
 ///
 /// The edge functions are off by some roundings of the squared distance to the corners; divided by twice the area that
 /// is the error of the barycentrics, and times the distance that of the place: it grows as a triangle gets thinner,
 /// and along the normal does not depend on the ray's direction. But t is clamped to where the ray crosses the
-/// triangle's box, so that leaving the box is enough: on an axis-aligned triangle that is no distance at all, and
-/// contact shadows stay attached. Seven roundings of the corners themselves are for the point's own place (Pharr et
-/// al. 6.8.5).
+/// triangle's box, so that a start above all of the box is enough, from where no ray that leaves the triangle meets it: on
+/// an axis-aligned triangle that is no distance at all, and contact shadows stay attached. Two roundings of the point's
+/// coordinates are for the start of a ray that is rounded in the mesh's own space.
 fn test_error(position: DVec3, weights: [f64; 3], [a, b, c]: [DVec3; 3], face: DVec3) -> f64 {
     let Some(normal) = normalize(face) else { return 0.0 };
     let twice_area = length(face);
-    let reach = [a, b, c].iter().fold(0.0f64, |reach, corner| reach.max((*corner - position).abs().max_element()));
-    let (min, max) = (a.min(b).min(c), a.max(b).max(c));
-    let leaving = |side: f64| {
-        let exit = |axis: usize| {
-            let along = side * normal[axis];
-            let plane = if along > 0.0 { max[axis] } else { min[axis] };
-            if along == 0.0 { f64::INFINITY } else { ((plane - position[axis]) / along).max(0.0) }
-        };
-        exit(0).min(exit(1)).min(exit(2))
-    };
-    let box_exit = leaving(1.0).max(leaving(-1.0));
-    let place = (a.abs() * weights[0] + b.abs() * weights[1] + c.abs() * weights[2]) * gamma(7);
-    (gamma(4) * reach * (1.0 + reach * reach / twice_area)).min(box_exit) + dot(normal.abs(), place)
+    let squared = |corner: DVec3| dot(corner - position, corner - position);
+    let reach_squared = squared(a).max(squared(b)).max(squared(c));
+    // How far the box reaches above and below the triangle's plane.
+    let half = 0.5 * (a.max(b).max(c) - a.min(b).min(c));
+    let middle = 0.5 * (a.max(b).max(c) + a.min(b).min(c));
+    let box_reach = dot(normal.abs(), half) + dot(normal, middle - position).abs();
+    let place = (a.abs() * weights[0] + b.abs() * weights[1] + c.abs() * weights[2]) * gamma(2);
+    (gamma(4) * reach_squared.sqrt() * (1.0 + reach_squared / twice_area)).min(box_reach) + dot(normal.abs(), place)
 }
 
 /// The weights of a triangle's corners where the f64 ray meets it, kept inside the triangle.
