@@ -23,7 +23,7 @@ use std::time::Instant;
 use glam::DVec3;
 
 use crate::error::Result;
-use crate::geometry::Hit;
+use crate::geometry::{Hit, Key};
 use crate::math::vector::{dot, length, normalize};
 use crate::measure::oracle::{Oracle, WideRay};
 use crate::progress::Progress;
@@ -161,6 +161,10 @@ impl Answers for Reference<'_> {
 
     fn first_hit(&self, ray: &WideRay) -> Hit {
         self.oracle.closest(ray).map_or(Hit::MISS, |found| found.hit())
+    }
+
+    fn next_until(&self, _: &WideRay, _: Key, _: f32) -> Hit {
+        Hit::MISS
     }
 
     fn is_blocked_by_opaque(&self, ray: &WideRay) -> bool {

@@ -45,6 +45,10 @@ pub trait Answers: Sync {
     /// The first hit in the order of [`Key`].
     fn first_hit(&self, ray: &Self::Ray) -> Hit;
 
+    /// The hit after another, no farther than `t_max`, where rounding may have put it behind that; an exact answer has it
+    /// in its place and gives a miss.
+    fn next_until(&self, ray: &Self::Ray, after: Key, t_max: f32) -> Hit;
+
     /// Whether anything is hit that is known to be opaque as a whole.
     fn is_blocked_by_opaque(&self, ray: &Self::Ray) -> bool;
 
@@ -91,6 +95,10 @@ impl<I: Intersect> Answers for I {
     #[inline(always)]
     fn first_hit(&self, ray: &Ray) -> Hit {
         self.closest(ray)
+    }
+
+    fn next_until(&self, ray: &Ray, after: Key, t_max: f32) -> Hit {
+        self.next_after(&Ray { t_min: after.t, t_max, ..*ray }, after)
     }
 
     #[inline(always)]

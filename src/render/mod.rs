@@ -15,6 +15,7 @@ pub mod sampling;
 pub mod settings;
 pub mod shade;
 pub mod shadow;
+mod silhouette;
 pub mod surface;
 pub mod trace;
 pub mod world;

@@ -34,19 +34,23 @@ impl<I: Answers> Tracer<'_, I> {
     /// The linear colour of the point that `hit` found along `view`.
     #[doc(alias = "Shade")]
     pub fn shade(&self, view: &ViewRay, hit: &Hit, depth: u32) -> Rgb {
-        let point = SurfacePoint::of(self.scene, self.world, view, hit);
+        self.shade_point(view, hit, &SurfacePoint::of(self.scene, self.world, view, hit), depth)
+    }
+
+    /// [`shade`](Self::shade) with the point that was found.
+    pub(super) fn shade_point(&self, view: &ViewRay, hit: &Hit, point: &SurfacePoint, depth: u32) -> Rgb {
         let material = &self.scene.materials[point.material as usize];
-        let colors = self.colors(&point, hit);
-        let here = Meeting { view, hit, point: &point };
+        let colors = self.colors(point, hit);
+        let here = Meeting { view, hit, point };
 
         // Ambient, then each light: diffuse and highlight.
         let mut color = colors.ambient;
         let lights = &self.world.lights;
         for light in if compiled::MANY_LIGHTS { lights } else { &lights[..1] } {
-            let Some(illumination) = Illumination::at(light, &point) else { continue };
+            let Some(illumination) = Illumination::at(light, point) else { continue };
             let visible = self.visibility(&here, &illumination);
             if visible != Rgb::ZERO {
-                color += visible * illumination.color * direct(material, colors.diffuse, &point, view, &illumination);
+                color += visible * illumination.color * direct(material, colors.diffuse, point, view, &illumination);
             }
         }
 

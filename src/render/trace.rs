@@ -8,6 +8,7 @@ use crate::geometry::{Hit, Ray};
 use crate::math::vector::dot;
 use crate::render::answers::Answers;
 use crate::render::settings::RayCounts;
+use crate::render::surface::SurfacePoint;
 use crate::render::world::World;
 use crate::scene::camera::ViewRay;
 use crate::scene::{Background, Rgb, Scene};
@@ -61,12 +62,13 @@ impl<'a, I: Answers> Tracer<'a, I> {
 
     fn trace_hit(&self, ray: &TracedRay<I::Ray>, depth: u32) -> (Rgb, Hit) {
         let hit = self.intersect.first_hit(&ray.ray);
-        let color = if hit.is_hit() {
-            self.shade(&ray.view, &hit, depth)
-        } else {
-            background(&self.scene.background, ray.view.direction)
-        };
-        (color, hit)
+        if !hit.is_hit() {
+            return (background(&self.scene.background, ray.view.direction), hit);
+        }
+        let point = SurfacePoint::of(self.scene, self.world, &ray.view, &hit);
+        let entry = if point.from_outside { None } else { self.entry_before(ray, &hit, &point) };
+        let (hit, point) = entry.unwrap_or((hit, point));
+        (self.shade_point(&ray.view, &hit, &point, depth), hit)
     }
 
     /// The rays traced so far.
