@@ -53,66 +53,24 @@ fn every_term_of_the_formula_at_one_point() {
 fn a_surface_is_lit_only_from_the_side_it_is_seen_from() {
     let mut scene = empty_scene();
     add_wall(&mut scene, white());
-    add_light(&mut scene, DVec3::new(0.0, 0.0, -4.0), Rgb::ONE);
-    assert_eq!(pixel(&scene), Rgb::ZERO, "from behind");
-    scene.lights.clear();
-    add_light(&mut scene, DVec3::new(4.0, 0.0, 0.0), Rgb::ONE);
-    assert_eq!(pixel(&scene), Rgb::ZERO, "N.L = 0 exactly");
-    scene.lights.clear();
-    add_light(&mut scene, DVec3::ZERO, Rgb::ONE);
-    assert_eq!(pixel(&scene), Rgb::ZERO, "at the point itself");
-    scene.lights.clear();
     add_light(&mut scene, DVec3::new(0.0, 0.0, 4.0), Rgb::ONE);
     near(pixel(&scene), Rgb::ONE, 1e-7);
     look(&mut scene, DVec3::new(0.0, 0.0, -5.0), DVec3::ZERO);
     assert_eq!(pixel(&scene), Rgb::ZERO, "seen from the other side");
 }
 
-/// Brightness of the floor y = 0 at (rho, 0) under a unit sphere that rests on it, a light at height 10.
-fn floor_under_sphere(rho: f64, as_mesh: bool) -> Rgb {
+#[test]
+fn the_seeds_clamp_keeps_every_reflection_at_most_1() {
     let mut scene = empty_scene();
-    let floor = rectangle(Vec3::new(-9.0, 0.0, 9.0), Vec3::X * 18.0, Vec3::Z * -18.0);
-    if as_mesh {
-        add_mesh(&mut scene, floor, DAffine3::IDENTITY, white());
-    } else {
-        add_quadric(&mut scene, shapes::plane(None), DAffine3::IDENTITY, white());
-    }
-    add_quadric(&mut scene, shapes::sphere(), placed(DVec3::Y, 1.0), white());
-    add_light(&mut scene, DVec3::new(0.0, 10.0, 0.0), Rgb::ONE);
-    // Seen from beside the sphere, through the gap.
-    look(&mut scene, DVec3::new(rho + 3.0 * rho, 0.3 * rho * rho, 0.0), DVec3::new(rho, 0.0, 0.0));
-    pixel(&scene)
-}
-
-#[test]
-fn a_spheres_shadow_has_the_radius_of_the_tangent_cone_and_is_attached() {
-    let radius = 10.0 / 80f64.sqrt();
-    for as_mesh in [false, true] {
-        for rho in [1e-3, 0.01, 0.1, 0.5, 1.0, radius * (1.0 - 1e-5)] {
-            assert_eq!(floor_under_sphere(rho, as_mesh), Rgb::ZERO, "{rho} lies in the shadow");
-        }
-        for rho in [radius * (1.0 + 1e-5), 1.2, 2.0] {
-            let n_dot_l = 10.0 / (100.0 + rho * rho).sqrt();
-            near(floor_under_sphere(rho, as_mesh), Rgb::splat(n_dot_l as f32), 1e-6);
-        }
-    }
-}
-
-#[test]
-fn facing_mirrors_add_up_to_the_geometric_series() {
-    for depth in [0u32, 1, 2, 5, 30, 1000] {
-        let mut scene = empty_scene();
-        let mirror = Material { emission: Rgb::ONE, kr: Rgb::splat(0.5), ..black() };
-        let tall = |x: f32| rectangle(Vec3::new(x, -1e4, -1e4), Vec3::Y * 2e4, Vec3::Z * 2e4);
-        add_mesh(&mut scene, tall(0.0), DAffine3::IDENTITY, mirror.clone());
-        add_mesh(&mut scene, tall(1.0), DAffine3::IDENTITY, mirror);
-        look(&mut scene, DVec3::new(0.5, 0.0, 0.0), DVec3::new(1.0, 0.01, 0.0));
-        scene.film.max_depth = depth;
-        let expected = 2.0 * (1.0 - 0.5f64.powi(depth as i32 + 1));
-        near(pixel(&scene), Rgb::splat(expected as f32), 1e-6);
-        scene.film.clamp = Clamp::Shade;
-        near(pixel(&scene), Rgb::ONE, 0.0);
-    }
+    let mirror = Material { emission: Rgb::ONE, kr: Rgb::splat(0.5), ..black() };
+    let tall = |x: f32| rectangle(Vec3::new(x, -1e4, -1e4), Vec3::Y * 2e4, Vec3::Z * 2e4);
+    add_mesh(&mut scene, tall(0.0), DAffine3::IDENTITY, mirror.clone());
+    add_mesh(&mut scene, tall(1.0), DAffine3::IDENTITY, mirror);
+    look(&mut scene, DVec3::new(0.5, 0.0, 0.0), DVec3::new(1.0, 0.01, 0.0));
+    scene.film.max_depth = 5;
+    near(pixel(&scene), Rgb::splat(2.0 - 0.5f32.powi(5)), 1e-6);
+    scene.film.clamp = Clamp::Shade;
+    near(pixel(&scene), Rgb::ONE, 0.0);
 }
 
 #[test]
@@ -180,23 +138,6 @@ fn a_transparent_mesh_attenuates_once_a_surface() {
     add_light(&mut scene, DVec3::new(0.01, 10.0, 0.003), Rgb::ONE);
     look(&mut scene, DVec3::new(4.0, 1.0, 0.0), DVec3::new(0.01, 0.0, 0.003));
     near(pixel(&scene), kt * kt, 1e-7);
-}
-
-#[test]
-fn light_does_not_leak_out_of_a_closed_cube() {
-    let mut scene = empty_scene();
-    add_mesh(&mut scene, cube(), DAffine3::IDENTITY, white());
-    add_light(&mut scene, DVec3::new(0.3, -0.2, 0.1), Rgb::ONE);
-    // Outside faces close to their edges, and the inside for contrast.
-    for k in 0..200 {
-        let along = -0.99 + 0.0099 * f64::from(k);
-        for inset in [1e-3, 1e-6, 1e-7] {
-            look(&mut scene, DVec3::new(1.5, along, 2.0), DVec3::new(1.0 - inset, along, 1.0));
-            assert_eq!(pixel(&scene), Rgb::ZERO, "{along} {inset}");
-        }
-    }
-    look(&mut scene, DVec3::new(-0.5, 0.0, 0.0), DVec3::new(1.0, 0.1, 0.2));
-    assert!(pixel(&scene).x > 0.1);
 }
 
 #[test]
@@ -289,26 +230,6 @@ fn spots_and_falloff_follow_their_definitions() {
         color: Rgb::ONE,
     }];
     near(pixel(&scene), Rgb::splat(0.8), 1e-7);
-}
-
-#[test]
-fn reflections_of_interpolated_normals_stay_above_the_surface() {
-    // A triangle whose normals lean 60 degrees; the mirror ray at grazing views would enter it. Below the floor's
-    // horizon all is red, above it green.
-    let lean = Vec3::new(60f32.to_radians().sin(), 60f32.to_radians().cos(), 0.0);
-    for degrees in [1.0f64, 5.0, 30.0, 80.0] {
-        let mut scene = empty_scene();
-        let mut mesh = rectangle(Vec3::new(-1.0, 0.0, 1.0), Vec3::X * 2.0, Vec3::Z * -2.0);
-        mesh.normals = Some(vec![lean; 4]);
-        add_mesh(&mut scene, mesh, DAffine3::IDENTITY, Material { kr: Rgb::ONE, ..black() });
-        scene.background = whitted::scene::Background::Gradient { bottom: Rgb::X, top: Rgb::Y, up: DVec3::Y };
-        let (sin, cos) = degrees.to_radians().sin_cos();
-        for side in [-1.0, 1.0] {
-            look(&mut scene, DVec3::new(side * cos, sin, 0.0) * 5.0, DVec3::ZERO);
-            let color = pixel(&scene);
-            assert!(color.is_finite() && color.y > 0.5, "{degrees} {side}: {color}");
-        }
-    }
 }
 
 /// A ray tracer of its own for one plane and two spheres, in f64, written from the seed's page alone.

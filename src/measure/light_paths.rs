@@ -15,6 +15,7 @@ use crate::geometry::quadric::Clip;
 use crate::geometry::{Hit, Quadric, shapes};
 use crate::math::random::Random;
 use crate::math::vector::{cross, dot};
+use crate::measure::cases::meshes;
 use crate::measure::scenes::{self, largest, ulp};
 use crate::progress::Progress;
 use crate::render::Renderer;
@@ -129,8 +130,7 @@ const POINTS_PER_CHECK: u64 = 4096;
 fn acne(params: &Params, place: &Place, count: u64, progress: &dyn Progress) -> Result<(u64, u64)> {
     // One light a channel, far and near, so that every angle to the surface occurs.
     let lights = [DVec3::new(300.0, 200.0, -100.0), DVec3::new(-2.0, 3.0, 1.5), DVec3::new(0.2, -1.2, 0.9)];
-    let (points, indices) = scenes::sphere_points(24, 48);
-    let ball = scenes::mesh_at(&points, indices)?;
+    let ball = meshes::sphere(24, 48, 1.0, DVec3::ZERO);
     let (mut lit, mut black) = (0, 0);
     for as_mesh in [true, false] {
         let mut scene = scenes::empty();
@@ -181,8 +181,8 @@ fn acne(params: &Params, place: &Place, count: u64, progress: &dyn Progress) -> 
 fn leaks(params: &Params, place: &Place, count: u64, progress: &dyn Progress) -> Result<(u64, u64)> {
     let mut scene = scenes::empty();
     let transform = scenes::placed(place.offset, place.scale);
-    let (points, indices) = scenes::cube_points();
-    scenes::add_mesh(&mut scene, scenes::mesh_at(&points, indices)?, transform, scenes::white());
+    let cube = meshes::moved(&meshes::cube(), |p| p * 2.0 - 1.0);
+    scenes::add_mesh(&mut scene, cube, transform, scenes::white());
     let room = scenes::placed(place.offset, 20.0 * place.scale);
     scenes::add_quadric(&mut scene, shapes::sphere(), room, scenes::white());
     let lamp = DVec3::new(0.3, -0.2, 0.1);

@@ -2,7 +2,7 @@
 
 use std::sync::Mutex;
 
-use glam::{DAffine3, DMat3, DVec3, Vec3};
+use glam::{DAffine3, DMat3, DVec3};
 
 use crate::accel::Params;
 use crate::error::Result;
@@ -210,13 +210,10 @@ pub fn largest(p: DVec3) -> f64 {
     p.abs().max_element()
 }
 
-/// The components as f32 numbers held in f64: what a mesh or a ray file keeps of a position.
-pub fn rounded(p: DVec3) -> DVec3 {
-    Vec3::as_dvec3(p.as_vec3())
-}
-
 #[cfg(test)]
 mod tests {
+    use glam::Vec3;
+
     use super::*;
     use crate::math::vector::{cross, dot};
     use crate::progress::Silent;

@@ -6,12 +6,22 @@
 
 mod agreement;
 mod boundaries;
+mod closed_walls;
+mod dark_lights;
 pub mod exact;
 mod extremes;
+mod far_quadrics;
 pub mod histogram;
+mod instances;
 pub mod meshes;
+mod mirrors;
 pub mod outcome;
+mod quadratics;
+mod quadrics;
 pub mod reduce;
+mod shadows;
+mod spawning;
+mod stand;
 pub mod structure;
 mod tightness;
 mod trees;
@@ -54,6 +64,15 @@ pub const ALL: &[&[Case]] = &[
     trees::CASES,
     agreement::CASES,
     extremes::CASES,
+    instances::CASES,
+    spawning::CASES,
+    shadows::CASES,
+    dark_lights::CASES,
+    closed_walls::CASES,
+    mirrors::CASES,
+    quadratics::CASES,
+    quadrics::CASES,
+    far_quadrics::CASES,
 ];
 
 /// How many rays a case may take.
