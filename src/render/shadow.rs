@@ -3,7 +3,6 @@
 use glam::DVec3;
 
 use crate::error::{Error, Result};
-use crate::math::float::gamma;
 use crate::math::vector::{dot, normalize};
 use crate::render::answers::{Answers, Meeting};
 use crate::render::surface::SurfacePoint;
