@@ -131,7 +131,7 @@ fn leave(structure: &Structure, random: &mut Random, distances: Distances, name:
     let size = if !is_mesh {
         length(target - instance.transform.to_world().translation)
     } else {
-        length(b - a).max(length(c - a))
+        length(b - a).max(length(c - a)).max(length(c - b))
     };
     let mut from = random.direction();
     if dot(from, outward) < 0.0 {
