@@ -19,14 +19,14 @@ use crate::measure::report::query::Effort;
 use crate::measure::report::ray_set::{Group, Question, RaySet};
 use crate::measure::report::rays::{RayKind, SEED};
 use crate::measure::report::subject::{HardSet, Subject};
-use crate::measure::report::{self, Options, Plane, Report};
+use crate::measure::report::{self, Options, Plane, Programs, Report};
 use crate::measure::speed::FEWEST_REPETITIONS;
 
 /// Flags of `report`.
 #[derive(Debug, Args)]
 pub struct ReportArguments {
     /// Scene files or models, each a part of the report.
-    #[arg(value_hint = ValueHint::FilePath, required_unless_present = "hard_set")]
+    #[arg(value_hint = ValueHint::FilePath, required_unless_present_any = ["hard_set", "planes"])]
     pub input: Vec<PathBuf>,
     /// Built-in meshes that are made to be hard, with commas between; parts of the report after the inputs.
     #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = one_of(hard_sets()))]
@@ -38,9 +38,13 @@ pub struct ReportArguments {
     /// Print the report as one JSON document and write no files, unless --out is given.
     #[arg(long)]
     pub json: bool,
-    /// What to measure, with commas between; everything if it is not given.
+    /// What to measure, with commas between; everything but `features`, which needs valgrind, if it is not given.
+    /// `quadric`, `light` and `features` have scenes of their own and need no input.
     #[arg(long, value_name = "PLANES", value_delimiter = ',', value_parser = one_of(planes()))]
     pub planes: Vec<Plane>,
+    /// A program to compare with that was built without a feature, for the plane `features`; may be given for each.
+    #[arg(long, value_name = "FEATURE=PROGRAM", value_parser = program_without, requires = "planes")]
+    pub without: Vec<(String, PathBuf)>,
     /// Rays to make, with commas between; without it all kinds, or none where --ray-file is given.
     #[arg(long, value_name = "KINDS", value_delimiter = ',', value_parser = one_of(ray_kinds()))]
     pub ray_kinds: Vec<RayKind>,
@@ -82,6 +86,13 @@ fn ray_kinds() -> impl Iterator<Item = (&'static str, RayKind)> {
     RayKind::ALL.into_iter().map(|kind| (kind.name(), kind))
 }
 
+fn program_without(text: &str) -> std::result::Result<(String, PathBuf), String> {
+    match text.split_once('=') {
+        Some((feature, program)) if !feature.is_empty() && !program.is_empty() => Ok((feature.into(), program.into())),
+        _ => Err("expected a feature, `=` and the program that was built without it".into()),
+    }
+}
+
 fn repetitions(text: &str) -> std::result::Result<u32, String> {
     match text.parse::<u32>() {
         Ok(0) => Ok(0),
@@ -108,10 +119,10 @@ pub fn run(arguments: &ReportArguments) -> Result<()> {
         fs::create_dir_all(folder).map_err(|cause| Error::system(folder, cause))?;
         check_writable(&folder.join("report.md"))?;
     }
+    let options = options(arguments)?;
     super::use_threads(arguments.threads)?;
     let terminal = Terminal::new(false)?;
     let file_rays = arguments.ray_file.as_deref().map(|path| read_rays(path, arguments.format)).transpose()?;
-    let options = options(arguments);
     let mut report = Report::new(Environment::detect(commit(), SEED), &options);
     let mut stopped = None;
     for part in parts(arguments) {
@@ -187,20 +198,30 @@ fn first_name(arguments: &ReportArguments) -> String {
     match (arguments.input.first(), arguments.hard_set.first()) {
         (Some(path), _) => stem(path),
         (None, Some(set)) => set.name().into(),
-        (None, None) => unreachable!("clap asks for one of the two"),
+        (None, None) => "own-scenes".into(),
     }
 }
 
-fn options(arguments: &ReportArguments) -> Options {
+fn options(arguments: &ReportArguments) -> Result<Options> {
     let all = arguments.ray_kinds.is_empty() && arguments.ray_file.is_none();
     let wanted = |kind: &RayKind| all || arguments.ray_kinds.contains(kind);
-    let measured = |plane: &Plane| arguments.planes.is_empty() || arguments.planes.contains(plane);
-    Options {
+    let planes = if arguments.planes.is_empty() { Plane::USUAL } else { &arguments.planes };
+    let measured = |plane: &Plane| planes.contains(plane);
+    if let Some(plane) = planes.iter().find(|plane| plane.needs_subject())
+        && arguments.input.is_empty()
+        && arguments.hard_set.is_empty()
+    {
+        return Err(Error::caller(format!("the plane `{}` measures a scene, and there is none", plane.name()))
+            .remedy("give an input or --hard-set"));
+    }
+    let whole = std::env::current_exe().map_err(|cause| Error::system(Path::new("whitted"), cause))?;
+    Ok(Options {
         planes: Plane::ALL.into_iter().filter(measured).collect(),
         kinds: RayKind::ALL.into_iter().filter(wanted).collect(),
         rays: arguments.rays as usize,
         effort: Effort { rays_timed: arguments.timed_rays as usize, repetitions: arguments.repeat },
-    }
+        programs: Programs { whole, without: arguments.without.clone() },
+    })
 }
 
 /// All rays of a file.

@@ -17,7 +17,7 @@ use crate::progress::Progress;
 pub mod scene;
 
 /// What a feature costs a scene, by a row of a table.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FeatureCost {
     /// The feature.
     pub feature: &'static str,

@@ -29,6 +29,7 @@ pub fn markdown(report: &Report, pictures: &[File]) -> String {
     }
     page += &own_scenes::spheres(&report.spheres, pictures);
     page += &own_scenes::light_paths(&report.light_paths);
+    page += &own_scenes::features(&report.features);
     page
 }
 

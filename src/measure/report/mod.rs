@@ -22,8 +22,11 @@ pub mod spawn;
 pub mod spheres;
 pub mod subject;
 
+use std::path::PathBuf;
+
 use crate::accel::Params;
 use crate::error::Result;
+use crate::measure::features::{self, FeatureCost};
 use crate::measure::light_paths::{self, DISTANCES, LightPaths, SCALES};
 use crate::measure::oracle::Oracle;
 use crate::progress::Progress;
@@ -56,11 +59,21 @@ pub enum Plane {
     Quadric,
     /// Shadows and mirrors against closed forms, on scenes of the report's own.
     Light,
+    /// Bytes and instructions of each feature, present and absent, on scenes of the report's own. Needs valgrind.
+    Features,
 }
 
 impl Plane {
     /// All of them.
-    pub const ALL: [Self; 5] = [Self::Query, Self::Spawn, Self::Image, Self::Quadric, Self::Light];
+    pub const ALL: [Self; 6] = [Self::Query, Self::Spawn, Self::Image, Self::Quadric, Self::Light, Self::Features];
+
+    /// Those that need nothing but this program.
+    pub const USUAL: &[Self] = &[Self::Query, Self::Spawn, Self::Image, Self::Quadric, Self::Light];
+
+    /// Whether it measures a scene of the user's or a hard set; others have scenes of their own.
+    pub fn needs_subject(self) -> bool {
+        matches!(self, Self::Query | Self::Spawn | Self::Image)
+    }
 
     /// The name on the command line.
     pub fn name(self) -> &'static str {
@@ -70,6 +83,7 @@ impl Plane {
             Self::Image => "image",
             Self::Quadric => "quadric",
             Self::Light => "light",
+            Self::Features => "features",
         }
     }
 }
@@ -97,6 +111,17 @@ pub struct Options {
     pub rays: usize,
     /// How many of them are timed, and how often.
     pub effort: Effort,
+    /// What instructions are counted of.
+    pub programs: Programs,
+}
+
+/// The programs whose instructions are counted.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Programs {
+    /// `whitted` itself.
+    pub whole: PathBuf,
+    /// Builds without a feature, by its name.
+    pub without: Vec<(String, PathBuf)>,
 }
 
 /// Everything that was measured.
@@ -120,6 +145,8 @@ pub struct Report {
     pub spheres: Vec<SphereRow>,
     /// Shadows and mirrors at several scales and distances from zero.
     pub light_paths: Vec<LightPaths>,
+    /// What features cost, present and absent.
+    pub features: Vec<FeatureCost>,
 }
 
 /// What was measured on one scene.
@@ -183,13 +210,14 @@ impl Report {
             subjects: Vec::new(),
             spheres: Vec::new(),
             light_paths: Vec::new(),
+            features: Vec::new(),
         }
     }
 
     /// Measures what needs no scene of the user's.
     ///
     /// # Errors
-    /// A cancellation.
+    /// A cancellation; where instructions are counted, what [`features::count`] says.
     pub fn measure_own_scenes(&mut self, options: &Options, progress: &dyn Progress) -> Result<()> {
         if options.planes.contains(&Plane::Quadric) {
             self.spheres = spheres::measure(options.effort.rays_timed, options.effort.repetitions, progress)?;
@@ -201,6 +229,9 @@ impl Report {
                 self.light_paths.push(light_paths::measure(&params, scale, distance, LIGHT_POINTS, &Quiet(progress))?);
                 progress.advance(1);
             }
+        }
+        if options.planes.contains(&Plane::Features) {
+            self.features = features::count(&options.programs.whole, &options.programs.without, progress)?;
         }
         Ok(())
     }
@@ -247,7 +278,7 @@ pub fn measure(
                 report.spawn = spawn::measure(subject, options.rays, options.effort.repetitions, progress)?;
             }
             Plane::Image => report.image = image::measure(subject, options.effort.repetitions, progress)?,
-            Plane::Quadric | Plane::Light => {}
+            Plane::Quadric | Plane::Light | Plane::Features => {}
         }
     }
     Ok(report)

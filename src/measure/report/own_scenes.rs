@@ -1,9 +1,10 @@
-//! The part of the page about scenes of the report's own: quadrics, shadows and mirrors.
+//! The part of the page about scenes of the report's own: quadrics, shadows and mirrors, features.
 
 use super::File;
 use super::document::{interval, picture, short, spread};
 use super::pictures::SPHERES;
 use super::spheres::SphereRow;
+use crate::measure::features::FeatureCost;
 use crate::measure::light_paths::{BOUNCES, LightPaths};
 use crate::measure::table::Table;
 
@@ -83,5 +84,41 @@ pub fn light_paths(rows: &[LightPaths]) -> String {
          their file's zero: lit points of a sphere that are black (acne), points outside a closed cube that its lamp lights \
          (leaks), the largest distance from a contact at which the shadow is lost, and the error of a ray's place after up to \
          {BOUNCES} mirrors, in f32 ulp of the scene's coordinates.\n\n{table}"
+    )
+}
+
+/// The section on what features cost; empty if that was not counted.
+pub fn features(rows: &[FeatureCost]) -> String {
+    if rows.is_empty() {
+        return String::new();
+    }
+    let headings = [
+        "feature",
+        "present: the plain scene and",
+        ">bytes absent",
+        ">bytes present",
+        ">instructions a ray absent",
+        ">present",
+        ">in a build without it",
+        ">cost of absence",
+    ];
+    let mut table = Table::new(&headings);
+    for row in rows {
+        table.push(vec![
+            row.feature.into(),
+            row.adds.into(),
+            row.bytes_absent.to_string(),
+            row.bytes_present.to_string(),
+            format!("{:.1}", row.instructions_absent),
+            format!("{:.1}", row.instructions_present),
+            row.instructions_without.map_or("not counted".into(), |count| format!("{count:.1}")),
+            row.cost_of_absence().map_or("not counted".into(), |cost| format!("{:+.2} %", 100.0 * cost)),
+        ]);
+    }
+    format!(
+        "\n## What features cost\n\nA plain scene, a matt ball of triangles on a floor under one lamp, and the same with one \
+         feature more. Bytes are those of geometry, textures, trees and top level. Instructions are those of user mode, counted \
+         by callgrind on one thread over whole renderings and divided by all rays, shadow rays included. The cost of absence \
+         compares the plain scene with itself in a build whose code for the feature was left out.\n\n{table}"
     )
 }
