@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use crate::geometry::triangle::hit_bounds;
 use crate::geometry::{Bounds, Hit, PreparedRay, TriangleMesh, intersect_triangle};
 
 /// A triangle as leaves hold it: all that a test needs, in one place.
@@ -22,7 +23,7 @@ impl LeafTriangle {
 
     /// The exact box.
     pub fn bounds(&self) -> Bounds {
-        Bounds::of(self.vertices)
+        hit_bounds(self.vertices)
     }
 
     /// The hit of a ray, if any.

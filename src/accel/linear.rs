@@ -19,7 +19,7 @@ impl TriangleAccelerator for Linear {
         let mut share = Share::new(progress, mesh.live_count() as u64);
         let triangles: Vec<_> = mesh.live_triangles().map(|number| LeafTriangle::new(mesh, number)).collect();
         share.reach(100)?;
-        Ok(Self { triangles, bounds: mesh.bounds() })
+        Ok(Self { triangles, bounds: mesh.hit_bounds() })
     }
 
     fn closest(&self, ray: &PreparedRay, instance: u32, best: &mut Hit) {

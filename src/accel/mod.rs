@@ -202,6 +202,6 @@ pub trait TriangleAccelerator: Sized + Send + Sync {
     /// A description of the first violation.
     fn validate(&self) -> std::result::Result<(), String>;
 
-    /// The box around all triangles, exact; empty for an empty mesh.
+    /// The box around what rays meet of all triangles ([`TriangleMesh::hit_bounds`]), exact; empty for an empty mesh.
     fn bounds(&self) -> Bounds;
 }

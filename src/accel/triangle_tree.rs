@@ -6,6 +6,7 @@ use super::leaf::{LeafTriangle, check_distinct};
 use super::topology::Topology;
 use super::{Params, TreeStats, TriangleAccelerator};
 use crate::error::Result;
+use crate::geometry::triangle::hit_bounds;
 use crate::geometry::{Bounds, Hit, Key, PreparedRay, TriangleMesh};
 use crate::progress::{Progress, Share};
 
@@ -43,7 +44,7 @@ pub trait TriangleTree: Sized + Send + Sync {
     /// A description of the first violation.
     fn validate_nodes(&self) -> std::result::Result<(), String>;
 
-    /// The exact box around all triangles.
+    /// The exact box around all boxes of triangles.
     fn bounds(&self) -> Bounds;
 }
 
@@ -54,7 +55,7 @@ impl<T: TriangleTree> TriangleAccelerator for T {
         progress.check()?;
         let mut share = Share::new(progress, mesh.live_count() as u64);
         let live: Vec<u32> = mesh.live_triangles().collect();
-        let boxes: Vec<Bounds> = live.iter().map(|&number| Bounds::of(mesh.triangle(number))).collect();
+        let boxes: Vec<Bounds> = live.iter().map(|&number| hit_bounds(mesh.triangle(number))).collect();
         let topology = Topology::build(&boxes, params.preset, T::MAX_LEAF, &mut share)?;
         drop(boxes);
         let triangles = topology.order.iter().map(|&at| LeafTriangle::new(mesh, live[at as usize])).collect();

@@ -92,7 +92,7 @@ impl Bounds {
 
     /// The part of `ray` inside this box, cut to `[near, far]`.
     ///
-    /// Per axis the planes are crossed at `(b - o) * inverse`, the far one with the inverse padded by 4 ulp, without
+    /// Per axis the planes are crossed at `(b - o) * inverse`, the far one with the inverse padded by some ulp, without
     /// fused operations. Both are monotone in `b`: rounding is monotone, and so is multiplication by a fixed number.
     /// Hence a box that contains another is entered no later and left no earlier, **bit for bit**, and a search that
     /// skips boxes entered after its best hit can neither lose nor reorder a hit that lies within its own box's

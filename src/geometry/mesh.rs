@@ -5,6 +5,7 @@ use robust::{Coord, orient2d};
 
 use crate::error::{Error, Result};
 use crate::geometry::bounds::Bounds;
+use crate::geometry::triangle::hit_bounds;
 
 /// Triangles over shared vertices, with optional attributes per vertex; absent attributes take no memory.
 ///
@@ -230,6 +231,12 @@ impl TriangleMesh {
     pub fn bounds(&self) -> Bounds {
         self.live_triangles()
             .fold(Bounds::EMPTY, |bounds, number| self.triangle(number).into_iter().fold(bounds, Bounds::with))
+    }
+
+    /// The box in which rays look for hits on the triangles: each one's [`hit_bounds`].
+    pub fn hit_bounds(&self) -> Bounds {
+        let each = self.live_triangles().map(|number| hit_bounds(self.triangle(number)));
+        each.fold(Bounds::EMPTY, Bounds::union)
     }
 
     /// Replaces shading normals by ones computed from the faces: the mean of the faces around a vertex, weighted by

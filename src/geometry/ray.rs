@@ -74,8 +74,7 @@ pub struct PreparedRay {
     pub direction: Vec3,
     /// 1 / direction per axis, not clamped: infinite, with the sign of the zero, where the direction is 0.
     pub inverse: Vec3,
-    /// `inverse` made 4 ulp larger in magnitude, for the far planes of boxes: 2 for what the box test itself rounds (Ize
-    /// 2013), and 2 for the shear of the triangle test, which must not find what the box test passes by.
+    /// `inverse` made [`PADDING`] ulp larger in magnitude, for the far planes of boxes.
     pub inverse_far: Vec3,
     /// Whether the direction's sign bit is set, per axis: then a box is entered through its upper plane.
     pub negative: [bool; 3],
@@ -125,7 +124,7 @@ impl PreparedRay {
             origin,
             direction,
             inverse,
-            inverse_far: Vec3::new(four_ulp_out(inverse.x), four_ulp_out(inverse.y), four_ulp_out(inverse.z)),
+            inverse_far: Vec3::new(padded(inverse.x), padded(inverse.y), padded(inverse.z)),
             negative: [direction.x, direction.y, direction.z].map(f32::is_sign_negative),
             axes,
             shear: Vec3::new(direction[axes[0]] / along, direction[axes[1]] / along, 1.0 / along),
@@ -151,12 +150,21 @@ impl PreparedRay {
     }
 }
 
-/// The value 4 ulp farther from zero; infinities stay.
+/// By how many ulp the far planes of boxes are padded.
+///
+/// Ize 2013 adds 2 for what the box test itself rounds. But the triangle test must not find what the box test passes by, and
+/// its sheared coordinates are rounded as well: relative to t the crossing of a near plane may come out 5 u late (the shear
+/// 2, the product 1, the box test's inverse and product 2) and that of a far plane 5 u early. An ulp of the inverse may be as
+/// little as u of it; 12 leave room for the products of these terms. What is not relative to t is the matter of
+/// [`hit_bounds`](crate::geometry::triangle::hit_bounds).
+pub const PADDING: u32 = 12;
+
+/// The value [`PADDING`] ulp farther from zero; infinities stay.
 #[inline(always)]
-fn four_ulp_out(x: f32) -> f32 {
+fn padded(x: f32) -> f32 {
     const INFINITY_BITS: u32 = f32::INFINITY.to_bits();
     let sign = x.to_bits() & 0x8000_0000;
-    let magnitude = (x.to_bits() & 0x7fff_ffff) + 4;
+    let magnitude = (x.to_bits() & 0x7fff_ffff) + PADDING;
     f32::from_bits(sign | if magnitude < INFINITY_BITS { magnitude } else { INFINITY_BITS })
 }
 
@@ -183,11 +191,11 @@ mod tests {
     }
 
     #[test]
-    fn the_padded_inverse_is_four_ulp_out_and_keeps_infinities() {
-        assert_eq!(four_ulp_out(1.0), 1.0 + 4.0 * f32::EPSILON);
-        assert_eq!(four_ulp_out(-1.0), -1.0 - 4.0 * f32::EPSILON);
-        assert_eq!(four_ulp_out(f32::INFINITY), f32::INFINITY);
-        assert_eq!(four_ulp_out(f32::NEG_INFINITY), f32::NEG_INFINITY);
-        assert_eq!(four_ulp_out(f32::MAX), f32::INFINITY);
+    fn the_padded_inverse_is_farther_out_and_keeps_infinities() {
+        assert_eq!(padded(1.0), 1.0 + 12.0 * f32::EPSILON);
+        assert_eq!(padded(-1.0), -1.0 - 12.0 * f32::EPSILON);
+        assert_eq!(padded(f32::INFINITY), f32::INFINITY);
+        assert_eq!(padded(f32::NEG_INFINITY), f32::NEG_INFINITY);
+        assert_eq!(padded(f32::MAX), f32::INFINITY);
     }
 }

@@ -6,12 +6,14 @@
 //!   what is left is decided, and its t and weights are computed, from edge functions in f64, where the product of two f32
 //!   is exact. Otherwise the weights of a sliver seen at a grazing angle are a few units of rounding, and the hit lies
 //!   beside the triangle by as much as it is wide; and numbers beyond 1e12 overflow.
-//! - t is clamped into the interval in which the ray crosses the triangle's own f32 box, so that no tree can cull a hit.
+//! - t is clamped into the interval in which the ray crosses the triangle's own f32 box ([`hit_bounds`]), so that no tree can
+//!   cull a hit.
 
 use glam::Vec3;
 
 use crate::geometry::bounds::Bounds;
 use crate::geometry::ray::PreparedRay;
+use crate::math::float::UNIT_ROUNDOFF;
 
 /// Where a ray meets a triangle: the point is `(1 - u - v) A + u B + v C`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -69,7 +71,7 @@ pub fn intersect_triangle(ray: &PreparedRay, a: Vec3, b: Vec3, c: Vec3) -> Optio
     let t = ((weight_a * az + weight_b * bz + weight_c * cz) / (determinant * along)) as f32;
 
     // Keep t where the ray crosses the triangle's box, then where it crosses the instance's.
-    let own = Bounds::of([a, b, c]).interval(ray, f32::NEG_INFINITY, f32::INFINITY);
+    let own = hit_bounds([a, b, c]).interval(ray, f32::NEG_INFINITY, f32::INFINITY);
     if own.is_empty() {
         return None;
     }
@@ -78,6 +80,34 @@ pub fn intersect_triangle(ray: &PreparedRay, a: Vec3, b: Vec3, c: Vec3) -> Optio
         return None;
     }
     Some(TriangleHit { t, u: (weight_b / determinant) as f32, v: (weight_c / determinant) as f32 })
+}
+
+/// The box in which the test looks for hits on a triangle: its own, made larger along axes along which it is not flat by
+/// 2^-21 of its largest extent. Every box around the triangle must hold this one.
+///
+/// Let E be the largest extent and `w` weights with which the rounded sheared corners average to 0, as they do wherever the
+/// edge functions say hit. A corner's `x - s z` is rounded by u times itself and by u |s z|, and the average of what is
+/// rounded is 0, so that the averages of x and z obey `x = s z (1 + 2 u) + h` with `|h| <= u (e_x + 3 s e_z) <= 4 u E`: off by
+/// something that does not shrink with t where corners lie before and behind the ray's origin, as those of a large triangle
+/// beside the ray do. Enlarged by 8 u E = 2^-21 E the box holds the average of the corners as the box test sees it, up to
+/// errors relative to t, which are the padding's. An axis along which the triangle is flat has `|h| <= 3 u s e_z`, in t no
+/// more than the other axes were enlarged by, and stays flat: axis-aligned walls keep their exact place.
+#[inline(always)]
+pub fn hit_bounds(corners: [Vec3; 3]) -> Bounds {
+    let Bounds { min, max } = Bounds::of(corners);
+    let extent = max - min;
+    let largest = if extent.x > extent.y { extent.x } else { extent.y };
+    let largest = if extent.z > largest { extent.z } else { largest };
+    let margin = largest * (8.0 * UNIT_ROUNDOFF as f32);
+    let grow = |axis: usize| {
+        if extent[axis] == 0.0 {
+            return (min[axis], max[axis]);
+        }
+        // One step farther covers the rounding of the sum and, where that is coarse, the margin itself.
+        ((min[axis] - margin).next_down(), (max[axis] + margin).next_up())
+    };
+    let [x, y, z] = [grow(0), grow(1), grow(2)];
+    Bounds { min: Vec3::new(x.0, y.0, z.0), max: Vec3::new(x.1, y.1, z.1) }
 }
 
 /// Whether some of the three are negative and some positive.
@@ -158,6 +188,33 @@ mod tests {
         let weights = DVec3::new(1.0 - f64::from(found.u) - f64::from(found.v), found.u.into(), found.v.into());
         let off = point(found.t.into()) - (a * weights.x + b * weights.y + c * weights.z);
         assert!(off.abs().max_element() < 1e-4, "{off}");
+    }
+
+    #[test]
+    fn a_shared_edge_is_hit_where_both_its_planes_are_sheared() {
+        // The ray passes the edge within rounding: one triangle is passed by, and the other's box must not be.
+        let hex = |bits: u32, exponent: i32| libm::ldexpf(bits as f32, exponent - 24);
+        let direction = Vec3::new(hex(0x1ff_d242, -2), hex(0x100_194a, -2), hex(0x1fa_f268, 0));
+        let (x, y) = (hex(0x145_8a6e, -2), hex(0x145_c7ae, -3));
+        let (low, high) = (Vec3::new(x, y, hex(0x10f_3d88, 0)), Vec3::new(x, y, hex(0x114_6b90, 1)));
+        let thirds = [
+            Vec3::new(hex(0x13c_5ed0, -1), -hex(0x120_9eba, -3), hex(0x142_70bc, 0)),
+            Vec3::new(hex(0x125_73a0, -6), hex(0x1d6_170c, -2), hex(0x142_70bc, 0)),
+        ];
+        let ray = PreparedRay::new(&Ray::new(Vec3::ZERO, direction)).unwrap();
+        assert!(thirds.iter().any(|&third| intersect_triangle(&ray, low, high, third).is_some()));
+    }
+
+    #[test]
+    fn boxes_grow_where_triangles_are_not_flat() {
+        let flat = hit_bounds([A, B, C]);
+        assert_eq!((flat.min.z, flat.max.z), (2.0, 2.0));
+        let margin = 8.0 * UNIT_ROUNDOFF as f32;
+        assert!(flat.min.x < -margin && flat.min.x > -1.01 * margin);
+        assert!(flat.max.y > 1.0 && flat.max.y < 1.0 + 2.0 * margin);
+        // Far from zero a margin finer than the coordinates is a step of them.
+        let far = hit_bounds([A, B, C].map(|p| p + Vec3::X * 1e6));
+        assert_eq!((far.min.x, far.max.x), (1e6f32.next_down(), (1e6f32 + 1.0).next_up()));
     }
 
     #[test]

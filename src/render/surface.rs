@@ -2,7 +2,8 @@
 
 use glam::{DAffine3, DVec2, DVec3, Vec3};
 
-use crate::geometry::Hit;
+use crate::geometry::triangle::hit_bounds;
+use crate::geometry::{Bounds, Hit};
 use crate::math::Transform;
 use crate::math::float::{gamma, round_down, round_up};
 use crate::math::vector::{cross, dot, length, normalize};
@@ -198,8 +199,9 @@ fn test_error(position: DVec3, weights: [f64; 3], [a, b, c]: [DVec3; 3], face: D
     let squared = |corner: DVec3| dot(corner - position, corner - position);
     let reach_squared = squared(a).max(squared(b)).max(squared(c));
     // How far the box reaches above and below the triangle's plane.
-    let half = 0.5 * (a.max(b).max(c) - a.min(b).min(c));
-    let middle = 0.5 * (a.max(b).max(c) + a.min(b).min(c));
+    let Bounds { min, max } = hit_bounds([a, b, c].map(|corner| corner.as_vec3()));
+    let (min, max) = (min.as_dvec3(), max.as_dvec3());
+    let (half, middle) = (0.5 * (max - min), 0.5 * (max + min));
     let box_reach = dot(normal.abs(), half) + dot(normal, middle - position).abs();
     let place = (a.abs() * weights[0] + b.abs() * weights[1] + c.abs() * weights[2]) * gamma(2);
     (gamma(4) * reach_squared.sqrt() * (1.0 + reach_squared / twice_area)).min(box_reach) + dot(normal.abs(), place)

@@ -52,7 +52,7 @@ impl World {
             let message = format!("material `{}`: kr + kt is more than 1 and would make light", material.name);
             return Err(Error::caller(message));
         }
-        let mesh_bounds: Vec<Bounds> = scene.meshes.iter().map(|mesh| mesh.bounds()).collect();
+        let mesh_bounds: Vec<Bounds> = scene.meshes.iter().map(|mesh| mesh.hit_bounds()).collect();
         let mesh_opaque: Vec<bool> = scene
             .meshes
             .iter()

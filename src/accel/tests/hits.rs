@@ -2,10 +2,10 @@
 
 use std::ops::ControlFlow;
 
-use glam::Vec3;
+use glam::{DVec3, Quat, Vec3};
 
 use super::compare::{compare, compare_on_hard_rays, prepare, rays_at};
-use super::meshes::{Random, grid, random_soup, soup, sphere, transformed};
+use super::meshes::{Random, grid, mesh, random_soup, soup, sphere, transformed};
 use crate::accel::triangle_tree::TriangleTree;
 use crate::accel::{Bvh2, CwBvh, Kind, Linear, Params, TriangleAccelerator, dispatch_kind};
 use crate::geometry::{Hit, PreparedRay, Ray, TriangleMesh};
@@ -172,6 +172,61 @@ fn nodes_outside_the_interval_are_not_visited() {
     }
     check::<Bvh2>();
     check::<CwBvh>();
+}
+
+/// A tetrahedron or a box of any proportions, turned or along the axes.
+fn solid(random: &mut Random) -> TriangleMesh {
+    let size = |random: &mut Random| 10f32.powf(random.unit() * 3.0 - 2.0);
+    let scale = Vec3::new(size(random), size(random), size(random));
+    if random.below(3) == 0 {
+        let corners = [(); 4].map(|()| random.vector() * scale);
+        return mesh(corners.to_vec(), vec![[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]]);
+    }
+    let turn = if random.below(2) == 0 {
+        Quat::IDENTITY
+    } else {
+        Quat::from_euler(glam::EulerRot::XYZ, random.unit() * 6.0, random.unit() * 6.0, random.unit() * 6.0)
+    };
+    let corner =
+        |i: usize| turn * (Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32) * 2.0 - 1.0) * scale;
+    let faces = [[0, 2, 1, 3], [4, 5, 6, 7], [0, 1, 4, 5], [2, 6, 3, 7], [0, 4, 2, 6], [1, 3, 5, 7]];
+    mesh((0..8).map(corner).collect(), faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [b, d, c]]).collect())
+}
+
+/// Faces that are large beside the ray's way to them: what rounding of their corners moves does not shrink with t. Rays
+/// from within pass an edge by a few units of it.
+#[test]
+fn closed_solids_of_large_faces_have_no_leaks() {
+    let mut random = Random::new(9);
+    for number in 0..600 {
+        let solid = solid(&mut random);
+        let center = solid.positions.iter().map(|p| p.as_dvec3()).sum::<DVec3>() / solid.positions.len() as f64;
+        let largest = solid.bounds().size().max_element();
+        let vector = |random: &mut Random| random.vector().as_dvec3();
+        let rays: Vec<Ray> = (0..400)
+            .map(|_| {
+                let [a, b, _] = solid.triangle(random.below(solid.indices.len()) as u32).map(|p| p.as_dvec3());
+                let on_edge = |at: f64| a + (b - a) * at;
+                let at = f64::from(random.unit());
+                let near = 10f64.powf(-3.0 * f64::from(random.unit()));
+                let beside = on_edge((at + (f64::from(random.unit()) - 0.5) * near).clamp(0.0, 1.0));
+                let inward = near * 10f64.powf(-f64::from(random.unit()));
+                let origin = (beside + (center - beside) * inward).as_vec3();
+                let target = on_edge(at) + vector(&mut random) * (largest * 2f64.powi(-22));
+                Ray::new(origin, (target - origin.as_dvec3()).as_vec3())
+            })
+            .collect();
+        let rays: Vec<_> = rays.iter().filter_map(PreparedRay::new).collect();
+        for &kind in Kind::ALL {
+            let mut best = vec![Hit::MISS; rays.len()];
+            dispatch_kind!(kind, A => {
+                A::build(&solid, &Params::default(), &Silent).unwrap().closest_batch(&rays, 0, &mut best);
+            });
+            if let Some(leak) = best.iter().position(|hit| !hit.is_hit()) {
+                panic!("{}: {:?} leaks out of solid {number} {:?}", kind.name(), rays[leak], solid.positions);
+            }
+        }
+    }
 }
 
 #[test]

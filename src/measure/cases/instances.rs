@@ -363,9 +363,9 @@ fn check_box(scene: &Scene, corners: &[Vec3], outcome: &mut Outcome) {
     let Some(bounds) = world.instances[0].bounds else { return };
     let m = scene.objects[0].transform;
     let columns = [m.matrix3.x_axis, m.matrix3.y_axis, m.matrix3.z_axis, m.translation];
-    // How far the box may reach beyond the shape's own box: that one's corners are what is transformed.
+    // How far the box may reach beyond the one in which rays look for the shape: that one's corners are transformed.
     let own = match scene.objects[0].shape {
-        Shape::Mesh(_) => scene.meshes[0].bounds(),
+        Shape::Mesh(_) => scene.meshes[0].hit_bounds(),
         Shape::Quadric(_) => scene.quadrics[0].bounds().unwrap_or(bounds),
     };
     for axis in 0..3 {

@@ -10,6 +10,7 @@ use glam::Vec3;
 use super::{BoxTest, TriangleTest};
 use crate::accel::{Node, Params, Topology};
 use crate::error::Result;
+use crate::geometry::triangle::hit_bounds;
 use crate::geometry::{Bounds, Hit, Ray, TriangleHit, TriangleMesh};
 use crate::progress::{Progress, Share};
 
@@ -31,7 +32,7 @@ impl Skeleton {
     pub fn build(mesh: &TriangleMesh, params: &Params, progress: &dyn Progress) -> Result<Self> {
         let mut share = Share::new(progress, 0);
         let live: Vec<u32> = mesh.live_triangles().collect();
-        let boxes: Vec<Bounds> = live.iter().map(|&number| Bounds::of(mesh.triangle(number))).collect();
+        let boxes: Vec<Bounds> = live.iter().map(|&number| hit_bounds(mesh.triangle(number))).collect();
         let topology = Topology::build(&boxes, params.preset, MAX_LEAF, &mut share)?;
         let primitives: Vec<u32> = topology.order.iter().map(|&at| live[at as usize]).collect();
         let corners = primitives.iter().map(|&number| mesh.triangle(number)).collect();

@@ -5,6 +5,7 @@
 use glam::Vec3;
 
 use super::TriangleTest;
+use crate::geometry::triangle::hit_bounds;
 use crate::geometry::{Bounds, PreparedRay, Ray, TriangleHit, intersect_triangle};
 
 /// The renderer's own: no f64 fallback, t clamped into the triangle's box.
@@ -143,7 +144,7 @@ impl<E: EdgeFunction> TriangleTest for Woop<E> {
         let [az, bz, cz] = relative.map(|p| sz * p[kz]);
         let mut t = (u * az + v * bz + w * cz) / determinant;
         if E::CLAMPED {
-            let own = Bounds::of(*corners).interval(ray, f32::NEG_INFINITY, f32::INFINITY);
+            let own = hit_bounds(*corners).interval(ray, f32::NEG_INFINITY, f32::INFINITY);
             if own.is_empty() {
                 return None;
             }
