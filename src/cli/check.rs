@@ -131,15 +131,19 @@ fn verdict(runs: &[Run]) -> Result<()> {
     Err(Error::limit(message).remedy("do not rely on this build; `--json` has all numbers for a report"))
 }
 
-const HEADER: &str = "case          rays     wrong  95 % bound  result  seconds  what, and its bar\n";
+const HEADER: &str = "case          rays     wrong   distinct  95 % bound  result  seconds  what, and its bar\n";
 
 /// One line on a case, one for each figure, and what is known of a failure.
 fn text(run: &Run) -> String {
     let Run { case, outcome, seconds } = run;
     let result = if outcome.passes() { "pass" } else { "FAIL" };
-    let (rays, wrong, bound) = (outcome.rays, outcome.wrong, outcome.bound());
+    let (rays, wrong) = (outcome.rays, outcome.wrong);
+    let (distinct, bound) = match outcome.bound() {
+        Some((questions, rate)) => (questions.to_string(), format!("{rate:.1e}")),
+        None => ("-".into(), "-".into()),
+    };
     let mut text = format!(
-        "{:<4} {rays:>13} {wrong:>9}  {bound:>10.1e}  {result:<6} {seconds:>8.1}  {}: {}\n",
+        "{:<4} {rays:>13} {wrong:>9}  {distinct:>9}  {bound:>10}  {result:<6} {seconds:>8.1}  {}: {}\n",
         case.id, case.title, case.bar
     );
     // Writing to a string cannot fail.

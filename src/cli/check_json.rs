@@ -34,8 +34,10 @@ struct CaseResult<'a> {
     bar: &'static str,
     rays: u64,
     wrong: u64,
-    /// Upper end of the 95 % interval of the rate of wrong answers.
-    bound: f64,
+    /// Different random questions put to the kind of structure that was asked the fewest; null where all are listed.
+    distinct: Option<u64>,
+    /// Upper end of the 95 % interval of the rate of those answered wrongly; null where all are listed.
+    bound: Option<f64>,
     passed: bool,
     seconds: f64,
     figures: &'a [Figure],
@@ -85,7 +87,8 @@ fn result(Run { case, outcome, seconds }: &Run) -> CaseResult<'_> {
         bar: case.bar,
         rays: outcome.rays,
         wrong: outcome.wrong,
-        bound: outcome.bound(),
+        distinct: outcome.bound().map(|(questions, _)| questions),
+        bound: outcome.bound().map(|(_, rate)| rate),
         passed: outcome.passes(),
         seconds: *seconds,
         figures: &outcome.figures,

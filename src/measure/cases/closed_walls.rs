@@ -3,7 +3,7 @@
 use glam::{DAffine3, DVec3};
 
 use super::stand::Stand;
-use super::{Case, Context, Failure, Outcome, Rays, Structure, meshes};
+use super::{Case, Context, Failure, Outcome, Rays, Structure, meshes, scene_seed};
 use crate::error::Result;
 use crate::geometry::quadric::Clip;
 use crate::geometry::{Quadric, TriangleMesh, shapes};
@@ -34,13 +34,14 @@ struct Walled {
 
 fn closed_walls(context: &Context<'_>) -> Result<Outcome> {
     let mut sum = Outcome::default();
-    for (number, walled) in walls()?.into_iter().enumerate() {
+    for (number, walled) in (0..).zip(walls()?) {
         let full = if number == 0 { 10_000_000 } else { 1_000_000 };
         let linear = if walled.name == "ball of triangles" { 1000 } else { 10 };
         let rays = Rays { quick: 300, full, linear };
-        let found = context.ask_all(&walled.scene, 0xd27, rays, |structure, random, number, outcome| {
-            look_at_wall(structure, &walled, random, number, outcome);
-        })?;
+        let found =
+            context.ask_all(&walled.scene, scene_seed(0xd27, number), rays, |structure, random, number, outcome| {
+                look_at_wall(structure, &walled, random, number, outcome);
+            })?;
         sum = sum.and(found);
     }
     Ok(sum)

@@ -27,7 +27,7 @@ fn lights_that_do_not_count(context: &Context<'_>) -> Result<Outcome> {
     let mut sum = Outcome::default();
     let rounds = context.count(6, 400);
     for params in context.params() {
-        sum = sum.and(context.for_all(0xd26, rounds, |random, number, outcome| {
+        sum = sum.and(context.for_params(&params, 0xd26, rounds, |random, number, outcome| {
             if let Err(error) = plane_without_light(context, &params, random, number, outcome) {
                 outcome.check(false, || Failure::text(error.to_string()));
             }

@@ -62,8 +62,8 @@ pub fn point_to_triangle(p: DVec3, corners: [Vec3; 3]) -> f64 {
 }
 
 /// What is wrong with a closest hit on meshes that stand where they are, if anything is: `None` where it is the exact one,
-/// or where the ray passes an edge of the exact one or of this within [`TIGHTNESS`], or begins or ends at one within
-/// [`T_TIGHTNESS`].
+/// or where the ray passes an edge of the exact one within [`TIGHTNESS`], or one of this, in its plane and before the exact
+/// one, or begins or ends at one within [`T_TIGHTNESS`].
 pub fn objection(oracle: &Oracle, ray: &Ray, hit: &Hit) -> Option<String> {
     let exact = oracle.closest(ray);
     let corners = |instance, primitive| oracle.triangle(instance, primitive).map(|(corners, _)| corners);
@@ -80,6 +80,9 @@ pub fn objection(oracle: &Oracle, ray: &Ray, hit: &Hit) -> Option<String> {
         None => Some(format!("triangle {} is hit, exactly there is none", hit.primitive)),
         Some(exact) if (exact.instance, exact.primitive) == (hit.instance, hit.primitive) => None,
         Some(exact) if borderline(exact.instance, exact.primitive) => None,
+        Some(exact) if is_in_front(oracle, ray, hit, exact.t.to_f64()) && borderline(hit.instance, hit.primitive) => {
+            None
+        }
         Some(exact) if hit.is_hit() => {
             // Another triangle may lie as near as rounding can tell: both may be off.
             let (near, here) = (exact.t.to_f64(), f64::from(hit.t));
@@ -91,6 +94,18 @@ pub fn objection(oracle: &Oracle, ray: &Ray, hit: &Hit) -> Option<String> {
         }
         Some(exact) => Some(format!("no hit, exactly triangle {} at {}", exact.primitive, exact.t.to_f64())),
     }
+}
+
+/// Whether a hit lies before a t, and in its triangle's plane within twice [`T_TIGHTNESS`].
+fn is_in_front(oracle: &Oracle, ray: &Ray, hit: &Hit, t: f64) -> bool {
+    let Some((corners, None)) = oracle.triangle(hit.instance, hit.primitive) else { return false };
+    f64::from(hit.t) <= t && off_plane(ray, corners, hit.t) <= 2.0 * T_TIGHTNESS
+}
+
+/// The distance of a ray's point from a triangle's plane, in units of u times the [`reach`].
+pub fn off_plane(ray: &Ray, corners: [Vec3; 3], t: f32) -> f64 {
+    let point = ray.origin.as_dvec3() + ray.direction.as_dvec3() * f64::from(t);
+    dot(normal(corners), point - corners[0].as_dvec3()).abs() / (UNIT_ROUNDOFF * reach(ray, corners))
 }
 
 #[cfg(test)]
@@ -132,6 +147,14 @@ mod tests {
         for height in [0.0, f32::EPSILON / 8.0] {
             let start = Ray::new(Vec3::new(0.25, 0.25, height), Vec3::NEG_Z);
             assert_eq!(objection(&oracle, &start, &hit(1.0, 1)), None);
+        }
+        // Past an edge by less than rounding: the upper or the lower, and the lower may not be passed over.
+        let wide = [Vec3::new(-9.0, -9.0, -1.0), Vec3::new(9.0, -9.0, -1.0), Vec3::new(0.0, 9.0, -1.0)];
+        let scene = meshes::scene(vec![meshes::soup([CORNERS, wide])]);
+        let oracle_of_both = Oracle::new(&scene).unwrap();
+        let past = Ray::new(Vec3::new(-1e-8, 0.25, 2.0), Vec3::NEG_Z);
+        for (hit, fine) in [(hit(2.0, 0), true), (hit(3.0, 1), true), (hit(2.5, 0), false), (Hit::MISS, false)] {
+            assert_eq!(objection(&oracle_of_both, &past, &hit).is_none(), fine, "{hit:?}");
         }
         let beside = Ray::new(Vec3::new(-0.25, 0.25, 2.0), Vec3::NEG_Z);
         assert_eq!(objection(&oracle, &beside, &Hit::MISS), None);

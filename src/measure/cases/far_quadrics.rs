@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DVec3, Vec3};
 
-use super::{Case, Context, Failure, Outcome, Rays, Structure, meshes};
+use super::{Case, Context, Failure, Outcome, Rays, Structure, meshes, scene_seed};
 use crate::accel::{Kind, Params};
 use crate::error::Result;
 use crate::geometry::{Key, Quadric, Ray, shapes};
@@ -52,7 +52,7 @@ fn far_spheres(context: &Context<'_>) -> Result<Outcome> {
                 let rays = Rays { quick: 90, full: 60_000, linear: 1 };
                 sum = sum.and(context.ask_all(
                     &scene,
-                    0xd33 + number as u64,
+                    scene_seed(0xd33, number as u64),
                     rays,
                     |structure, random, number, outcome| {
                         let oracle = Oracle::new(structure.renderer.scene());

@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 
-use super::{Case, Context, Failure, Outcome, Rays, Structure, meshes};
+use super::{Case, Context, Failure, Outcome, Rays, Structure, meshes, scene_seed};
 use crate::error::{Error, Fault, Result};
 use crate::formats::LoadOptions;
 use crate::geometry::quadric::Clip;
@@ -115,16 +115,17 @@ fn placed_shapes(context: &Context<'_>) -> Result<Outcome> {
     ball.normals = Some(ball.positions.clone());
     let rays = Rays { quick: 400, full: 200_000, linear: 10 };
     let mut sum = Outcome::default();
-    for (name, to_world) in transforms() {
+    for (number, (name, to_world)) in (0..).zip(transforms()) {
         let placed = Placed::new(to_world);
         for as_mesh in [true, false] {
+            let seed = scene_seed(0xd21, 2 * number + u64::from(as_mesh));
             let mut scene = scenes::empty();
             if as_mesh {
                 scenes::add_mesh(&mut scene, ball.clone(), to_world, scenes::white());
             } else {
                 scenes::add_quadric(&mut scene, shapes::sphere(), to_world, scenes::white());
             }
-            sum = sum.and(context.ask_all(&scene, 0xd21, rays, |structure, random, number, outcome| {
+            sum = sum.and(context.ask_all(&scene, seed, rays, |structure, random, number, outcome| {
                 let Some((ray, outside)) = aimed(&placed, random, number) else { return };
                 let mesh = as_mesh.then_some(&ball);
                 check_placed(structure, &placed, mesh, &ray, outside, outcome, name);

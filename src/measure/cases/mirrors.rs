@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 
-use super::{Case, Context, Failure, Outcome, meshes};
+use super::{Case, Context, Failure, Outcome, meshes, scene_seed};
 use crate::accel::Params;
 use crate::error::{Fault, Result};
 use crate::geometry::{Quadric, shapes};
@@ -90,8 +90,8 @@ fn facing_mirrors(context: &Context<'_>) -> Result<Outcome> {
     let mut sum = Outcome::default();
     let paths = context.count(4, 300);
     for params in context.params() {
-        for made in [Made::Mesh, Made::Planes, Made::Pair] {
-            for placed in placements() {
+        for (number, made) in (0..).zip([Made::Mesh, Made::Planes, Made::Pair]) {
+            for (place, placed) in (0..).zip(placements()) {
                 // Planes without end have no place from which the scene's origin could be chosen.
                 if made != Made::Mesh && largest(placed.translation) > 1e3 {
                     continue;
@@ -101,7 +101,8 @@ fn facing_mirrors(context: &Context<'_>) -> Result<Outcome> {
                 let mut scene = mirrors(made, placed, &scenes::mirror(1.0, 0.0))?;
                 scene.film.max_depth = BOUNCES;
                 let renderer = scenes::build(scene, &params, context.progress)?;
-                sum = sum.and(context.for_all(0xd28, paths, |random, _, outcome| {
+                let seed = scene_seed(0xd28, 256 * number + place);
+                sum = sum.and(context.for_params(&params, seed, paths, |random, _, outcome| {
                     bounce(&renderer, &placed, BOUNCES, random, outcome);
                 })?);
             }
@@ -188,7 +189,7 @@ fn leaning_normals(context: &Context<'_>) -> Result<Outcome> {
     let mut sum = Outcome::default();
     let rounds = context.count(60, 20_000);
     for params in context.params() {
-        sum = sum.and(context.for_all(0xd29, rounds, |random, number, outcome| {
+        sum = sum.and(context.for_params(&params, 0xd29, rounds, |random, number, outcome| {
             lean(context, &params, random, number, outcome).unwrap_or_else(|error| {
                 outcome.check(false, || Failure::text(error.to_string()));
             });

@@ -31,7 +31,7 @@ mod watertight;
 use glam::Vec3;
 use rayon::prelude::*;
 
-pub use outcome::{Failure, Figure, Outcome};
+pub use outcome::{Drawn, Failure, Figure, Outcome};
 pub use structure::{Answer, Structure};
 
 use crate::accel::{Kind, Params, Preset};
@@ -134,8 +134,9 @@ impl<'a> Context<'a> {
 
     /// Asks every structure over a scene as many questions as `rays` says, in parallel, and adds up what was found.
     ///
-    /// All structures are asked the same questions as far as their counts go. `body` gets the structure, a source of
-    /// random numbers, and the question's number.
+    /// All kinds are asked the same questions as far as their counts go, and each of a kind's presets its own part of
+    /// them: no question is put to a kind twice. `body` gets the structure, a source of random numbers, and the question's
+    /// number among those of its preset.
     ///
     /// # Errors
     /// A cancellation, or a build that was refused.
@@ -148,12 +149,45 @@ impl<'a> Context<'a> {
     ) -> Result<Outcome> {
         let mut sum = Outcome::default();
         for structure in self.structures(scene) {
-            let structure = structure?;
-            let total = self.share(&structure.params, rays);
-            sum = sum
-                .and(self.for_all(seed, total, |random, number, outcome| body(&structure, random, number, outcome))?);
+            sum = sum.and(self.ask(&structure?, seed, rays, &body)?);
         }
         Ok(sum)
+    }
+
+    /// [`Self::ask_all`] of one structure.
+    ///
+    /// # Errors
+    /// A cancellation.
+    pub fn ask(
+        &self,
+        structure: &Structure,
+        seed: u64,
+        rays: Rays,
+        body: impl Fn(&Structure, &mut Random, u64, &mut Outcome) + Sync,
+    ) -> Result<Outcome> {
+        let params = &structure.params;
+        let body = |random: &mut Random, number: u64, outcome: &mut Outcome| body(structure, random, number, outcome);
+        self.for_params(params, seed, self.share(params, rays), body)
+    }
+
+    /// [`Self::for_all`] with other random numbers for each preset of a kind, counted as questions to that kind.
+    ///
+    /// # Errors
+    /// A cancellation.
+    pub fn for_params(
+        &self,
+        params: &Params,
+        seed: u64,
+        total: u64,
+        body: impl Fn(&mut Random, u64, &mut Outcome) + Sync,
+    ) -> Result<Outcome> {
+        let preset = presets(params.kind).iter().position(|preset| *preset == params.preset).unwrap_or(0);
+        Ok(self.for_all(seed ^ (preset as u64) << 48, total, body)?.of_kind(params.kind.resolve()))
+    }
+
+    /// The bar of a measured time: with little effort it is only reported, since other work runs beside tests.
+    pub fn time_bar(&self, bar: f64) -> Option<f64> {
+        (self.effort == Effort::Full).then_some(bar)
     }
 
     /// The part of `rays` that one structure with one preset gets.
@@ -187,14 +221,24 @@ impl<'a> Context<'a> {
                 let mut outcome = Outcome::default();
                 let numbers = piece * PIECE..((piece + 1) * PIECE).min(total);
                 let steps = numbers.end - numbers.start;
+                let mut drawn = Drawn { kind: None, questions: 0, wrong: 0 };
                 for number in numbers {
+                    let (rays, wrong) = (outcome.rays, outcome.wrong);
                     body(&mut random, number, &mut outcome);
+                    drawn.questions += u64::from(outcome.rays > rays);
+                    drawn.wrong += u64::from(outcome.wrong > wrong);
                 }
+                outcome.draw(drawn);
                 self.progress.advance(steps);
                 Ok(outcome)
             })
             .try_reduce(Outcome::default, |a, b| Ok(a.and(b)))
     }
+}
+
+/// The seed of a case's questions on one of its scenes: those of another scene are no copies of them, moved or scaled.
+fn scene_seed(case: u64, scene: u64) -> u64 {
+    case + (scene << 16)
 }
 
 /// A direction made as long as 1, rounded once; zero stays.
@@ -241,6 +285,32 @@ mod tests {
         assert_eq!((of(Kind::Linear), of(Kind::Bvh2), of(Kind::Auto)), (10, 34, 34));
         assert_eq!(context.params().filter(|params| params.kind == Kind::Linear).count(), 1);
         assert_eq!(context.params().filter(|params| params.kind == Kind::CwBvh).count(), 3);
+    }
+
+    #[test]
+    fn no_question_is_put_to_a_kind_twice_and_kinds_are_asked_the_same() {
+        use std::collections::BTreeMap;
+        use std::sync::Mutex;
+        let scene = meshes::scene(vec![meshes::square()]);
+        let context = Context::quick(&Silent);
+        let asked: Mutex<BTreeMap<&str, Vec<u64>>> = Mutex::default();
+        // More than one piece for each preset.
+        let rays = Rays { quick: 6000, full: 0, linear: 3 };
+        let outcome = context.ask_all(&scene, 7, rays, |structure, random, _, outcome| {
+            outcome.check(true, || unreachable!());
+            asked.lock().unwrap().entry(structure.params.kind.name()).or_default().push(random.bits());
+        });
+        assert_eq!(outcome.unwrap().bound().unwrap().0, 6000);
+        let mut asked = asked.into_inner().unwrap();
+        for questions in asked.values_mut() {
+            let count = questions.len();
+            questions.sort_unstable();
+            questions.dedup();
+            assert_eq!(questions.len(), count);
+        }
+        let trees: Vec<_> = asked.iter().filter(|(kind, _)| **kind != Kind::Linear.name()).collect();
+        assert!(trees.iter().all(|(_, questions)| questions.len() == 6000 && *questions == trees[0].1));
+        assert_eq!(asked[Kind::Linear.name()].len(), 2000);
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use crate::accel::Kind;
 use crate::geometry::Ray;
 use crate::measure::cases::reduce::reduce;
 use crate::measure::statistics::rate_bound;
@@ -13,10 +14,23 @@ pub struct Outcome {
     pub rays: u64,
     /// Answers that break the case's rule.
     pub wrong: u64,
+    /// The questions that were drawn at random, by the kind of structure that was asked; `None` where there is none.
+    pub drawn: Vec<Drawn>,
     /// The simplest of the wrong answers.
     pub failure: Option<Failure>,
     /// What was measured beside right and wrong, some of it with bars.
     pub figures: Vec<Figure>,
+}
+
+/// Questions drawn at random, each of its own: none is another's copy. A question may check several answers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Drawn {
+    /// What kind of structure was asked, with whichever preset.
+    pub kind: Option<Kind>,
+    /// Questions of which an answer was checked.
+    pub questions: u64,
+    /// Those of which an answer was wrong.
+    pub wrong: u64,
 }
 
 /// A wrong answer.
@@ -90,6 +104,30 @@ impl Outcome {
         for Figure { name, value, bar } in other.figures {
             self.figure(name, value, bar);
         }
+        for drawn in other.drawn {
+            self.draw(drawn);
+        }
+        self
+    }
+
+    /// Counts questions that were drawn.
+    pub fn draw(&mut self, Drawn { kind, questions, wrong }: Drawn) {
+        match self.drawn.iter_mut().find(|drawn| drawn.kind == kind) {
+            Some(drawn) => (drawn.questions, drawn.wrong) = (drawn.questions + questions, drawn.wrong + wrong),
+            None => self.drawn.push(Drawn { kind, questions, wrong }),
+        }
+    }
+
+    /// The same, of questions that come from a list: nothing was drawn.
+    pub fn of_a_list(self) -> Self {
+        Self { drawn: Vec::new(), ..self }
+    }
+
+    /// The same, with all questions put to one kind of structure.
+    pub fn of_kind(mut self, kind: Kind) -> Self {
+        for drawn in &mut self.drawn {
+            drawn.kind = Some(kind);
+        }
         self
     }
 
@@ -100,9 +138,15 @@ impl Outcome {
             && self.figures.iter().all(|figure| figure.bar.is_none_or(|bar| figure.value <= bar))
     }
 
-    /// The upper end of the 95 % interval of the rate of wrong answers.
-    pub fn bound(&self) -> f64 {
-        rate_bound(self.wrong, self.rays)
+    /// How many different questions were drawn at random for the kind of structure that was asked the fewest, and the upper
+    /// end of the 95 % interval of the rate of those answered wrongly, for the kind where it is highest. `linear` counts
+    /// where no tree was asked. `None` where all questions come from a list.
+    pub fn bound(&self) -> Option<(u64, f64)> {
+        let is_tree = |drawn: &&Drawn| drawn.kind != Some(Kind::Linear);
+        let any_tree = self.drawn.iter().any(|drawn| is_tree(&drawn));
+        let counted = || self.drawn.iter().filter(move |drawn| !any_tree || is_tree(drawn));
+        let fewest = counted().map(|drawn| drawn.questions).min()?;
+        Some((fewest, counted().map(|drawn| rate_bound(drawn.wrong, drawn.questions)).fold(0.0, f64::max)))
     }
 
     /// Makes the kept failure simpler where it names a ray: `fails` says whether a simpler ray, and triangle if there is
@@ -147,6 +191,24 @@ mod tests {
         assert_eq!(sum.figures.len(), 1);
         assert_eq!(sum.figures[0].value, 4.0);
         assert!(!sum.passes());
+    }
+
+    #[test]
+    fn bounds_are_those_of_the_tree_that_was_asked_least() {
+        let mut outcome = Outcome::default();
+        assert_eq!(outcome.bound(), None);
+        let mut draw = |kind, questions, wrong| outcome.draw(Drawn { kind: Some(kind), questions, wrong });
+        draw(Kind::Linear, 10, 0);
+        draw(Kind::Bvh2, 1000, 0);
+        draw(Kind::CwBvh, 2000, 0);
+        draw(Kind::Bvh2, 500, 0);
+        let (questions, bound) = outcome.bound().unwrap();
+        assert_eq!(questions, 1500);
+        // With nothing wrong the bound is 1 - 0.05^(1 / n).
+        assert!((bound - (1.0 - 0.05f64.powf(1.0 / 1500.0))).abs() < 1e-9, "{bound}");
+        let drawn = Drawn { kind: None, questions: 20, wrong: 0 };
+        let linear = Outcome { drawn: vec![drawn], ..Outcome::default() }.of_kind(Kind::Linear);
+        assert_eq!(linear.bound().unwrap().0, 20);
     }
 
     #[test]

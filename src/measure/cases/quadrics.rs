@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DMat3, DVec3};
 
-use super::{Case, Context, Failure, Outcome, Rays};
+use super::{Case, Context, Failure, Outcome, Rays, scene_seed};
 use crate::error::Result;
 use crate::geometry::Quadric;
 use crate::math::random::Random;
@@ -167,7 +167,7 @@ fn value(k: &[f64; 10], p: DVec3) -> (f64, DVec3) {
 
 fn canonical_set(context: &Context<'_>) -> Result<Outcome> {
     let mut sum = Outcome::default();
-    for Canonical { name, coefficients, lines } in canonical() {
+    for (number, Canonical { name, coefficients, lines }) in (0..).zip(canonical()) {
         for turn in 0..3 {
             // The same surface times any factor, of either sign.
             for factor in [1.0, -1.0, 1e-30, -3e25, 0.7] {
@@ -187,9 +187,13 @@ fn canonical_set(context: &Context<'_>) -> Result<Outcome> {
                 }
             }
             let k = cycled(&coefficients, turn);
-            let found = context.for_all(0xd31, context.count(60, 20_000), |random, number, outcome| {
-                residual(name, &k, random, number, outcome);
-            })?;
+            let found = context.for_all(
+                scene_seed(0xd31, 3 * number + turn as u64),
+                context.count(60, 20_000),
+                |random, number, outcome| {
+                    residual(name, &k, random, number, outcome);
+                },
+            )?;
             sum = sum.and(found);
         }
     }
@@ -277,32 +281,37 @@ fn focus(context: &Context<'_>) -> Result<Outcome> {
         scene.film.max_depth = 1;
         let goal = point(&placed, DVec3::Z);
         let rays = Rays { quick: 60, full: 200_000, linear: 1 };
-        sum = sum.and(context.ask_all(&scene, 0xd32, rays, |structure, random, _, outcome| {
-            let (x, y) = (random.between(-2.0, 2.0), random.between(-2.0, 2.0));
-            let (rays, _) = scenes::path(
-                &structure.renderer,
-                point(&placed, DVec3::new(x, y, 10.0)),
-                apply(&placed.matrix3, DVec3::NEG_Z),
-            );
-            let Some(reflected) = rays.get(1) else {
-                outcome.check(false, || Failure::text(format!("{structure}: no hit from ({x}, {y}, 10) down")));
-                return;
-            };
-            let (o, d) = (reflected.origin.as_dvec3(), reflected.direction.as_dvec3());
-            let miss = length(cross(goal - o, d)) / (length(d) * size);
-            // Four steps of f32 at the canonical bowl's coordinates, up to 2, are 1e-6; turned and moved ones go farther.
-            let bar = (4.0 * ulp(scenes::largest(o)) / size).max(1e-6);
-            if number == 0 {
-                outcome.figure("distance from the focus", miss, Some(1e-6));
-            }
-            outcome.figure("distance from the focus over its bar, turned and moved too", miss / bar, Some(1.0));
-            outcome.check(miss <= bar && dot(goal - o, d) > 0.0, || {
-                Failure::of_ray(
-                    reflected,
-                    format!("{structure}: passes the focus {goal} at {miss:e}, placed {placed:?}"),
-                )
-            });
-        })?);
+        sum = sum.and(context.ask_all(
+            &scene,
+            scene_seed(0xd32, u64::from(number)),
+            rays,
+            |structure, random, _, outcome| {
+                let (x, y) = (random.between(-2.0, 2.0), random.between(-2.0, 2.0));
+                let (rays, _) = scenes::path(
+                    &structure.renderer,
+                    point(&placed, DVec3::new(x, y, 10.0)),
+                    apply(&placed.matrix3, DVec3::NEG_Z),
+                );
+                let Some(reflected) = rays.get(1) else {
+                    outcome.check(false, || Failure::text(format!("{structure}: no hit from ({x}, {y}, 10) down")));
+                    return;
+                };
+                let (o, d) = (reflected.origin.as_dvec3(), reflected.direction.as_dvec3());
+                let miss = length(cross(goal - o, d)) / (length(d) * size);
+                // Four steps of f32 at the canonical bowl's coordinates, up to 2, are 1e-6; turned and moved ones go farther.
+                let bar = (4.0 * ulp(scenes::largest(o)) / size).max(1e-6);
+                if number == 0 {
+                    outcome.figure("distance from the focus", miss, Some(1e-6));
+                }
+                outcome.figure("distance from the focus over its bar, turned and moved too", miss / bar, Some(1.0));
+                outcome.check(miss <= bar && dot(goal - o, d) > 0.0, || {
+                    Failure::of_ray(
+                        reflected,
+                        format!("{structure}: passes the focus {goal} at {miss:e}, placed {placed:?}"),
+                    )
+                });
+            },
+        )?);
     }
     Ok(sum)
 }

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::stand::Stand;
-use super::{Case, Context, Failure, Outcome, meshes};
+use super::{Case, Context, Failure, Outcome, meshes, scene_seed};
 use crate::accel::Params;
 use crate::error::Result;
 use crate::geometry::{Hit, Quadric, shapes};
@@ -28,13 +28,16 @@ pub const CASES: &[Case] = &[Case {
 fn ball_on_floor(context: &Context<'_>) -> Result<Outcome> {
     let mut sum = Outcome::default();
     let turns = context.count(3, 200);
+    let mut number = 0;
     for stand in Stand::all() {
         for floor in 0..3 {
             for as_mesh in [false, true] {
+                number += 1;
+                let seed = scene_seed(0xd25, number);
                 let (scene, floor) = shadow_scene(&stand, floor, as_mesh)?;
                 for params in context.params() {
                     let renderer = scenes::build(scene.clone(), &params, context.progress)?;
-                    sum = sum.and(context.for_all(0xd25, turns, |random, _, outcome| {
+                    sum = sum.and(context.for_params(&params, seed, turns, |random, _, outcome| {
                         shadow_radii(&renderer, &stand, floor, as_mesh, random, outcome);
                     })?);
                 }

@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 
-use super::{Case, Context, Failure, Outcome, Rays, Structure, meshes};
+use super::{Case, Context, Failure, Outcome, Rays, Structure, meshes, scene_seed};
 use crate::error::Result;
 use crate::geometry::{Ray, TriangleMesh, shapes};
 use crate::math::random::Random;
@@ -32,11 +32,13 @@ fn spawned_rays(context: &Context<'_>) -> Result<Outcome> {
     let scales = &scales[..context.count(3, 7) as usize];
     let each =
         |configurations: u64| Rays { quick: 1200 / configurations, full: 1_000_000 / configurations, linear: 10 };
-    let mut sum = Outcome::default();
+    let (mut sum, mut scenes_asked) = (Outcome::default(), 0);
     let mut ask = |name: &str, scene: &Scene, distances: Distances, rays: Rays| -> Result<()> {
-        let found = context.ask_all(scene, 0xd24, rays, |structure, random, _, outcome| {
-            leave(structure, random, distances, name, outcome);
-        })?;
+        scenes_asked += 1;
+        let found =
+            context.ask_all(scene, scene_seed(0xd24, scenes_asked), rays, |structure, random, _, outcome| {
+                leave(structure, random, distances, name, outcome);
+            })?;
         sum = std::mem::take(&mut sum).and(found);
         Ok(())
     };

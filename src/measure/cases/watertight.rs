@@ -4,11 +4,13 @@ use glam::{DVec3, Vec3};
 
 use super::exact::normal;
 use super::histogram::Histogram;
-use super::{Answer, Case, Context, Failure, Outcome, Rays, Structure, meshes};
+use super::{Answer, Case, Context, Failure, Outcome, Rays, Structure, meshes, scene_seed};
 use crate::error::Result;
 use crate::geometry::{Ray, TriangleMesh};
 use crate::math::random::Random;
-use crate::math::vector::dot;
+use crate::math::vector::{dot, length};
+use crate::measure::oracle::Oracle;
+use crate::scene::Scene;
 
 /// The cases of this file.
 pub const CASES: &[Case] = &[
@@ -39,12 +41,65 @@ fn inside_a_sphere(context: &Context<'_>) -> Result<Outcome> {
     for (place, center) in [(0, DVec3::ZERO), (1, FAR)] {
         let scene = meshes::scene(vec![meshes::sphere(48, 96, 2.0, center)]);
         let mesh = &scene.meshes[0];
-        sum = sum.and(context.ask_all(&scene, 0xd1 + place, EACH, |structure, random, number, outcome| {
-            let ray = outward_ray(mesh, center, 1.0, random, number);
-            must_hit(structure, &ray, outcome);
-        })?);
+        let certain = |_: &Oracle, ray: &Ray| is_inside(ray, center, 2.0);
+        sum = sum.and(all_hit(
+            context,
+            &scene,
+            scene_seed(0xd1, place),
+            EACH,
+            certain,
+            |structure, random, number, outcome| {
+                let ray = outward_ray(mesh, center, 1.0, random, number);
+                must_hit(structure, &ray, outcome);
+            },
+        )?);
     }
     Ok(sum)
+}
+
+/// [`Context::ask_all`] where every ray must hit. A failure's ray is made as simple as it can be while `certain` says that
+/// it must hit and it does not; the failure names the triangle that is exactly hit.
+fn all_hit(
+    context: &Context<'_>,
+    scene: &Scene,
+    seed: u64,
+    rays: Rays,
+    certain: impl Fn(&Oracle, &Ray) -> bool,
+    body: impl Fn(&Structure, &mut Random, u64, &mut Outcome) + Sync,
+) -> Result<Outcome> {
+    let mut sum = Outcome::default();
+    for structure in context.structures(scene) {
+        let structure = structure?;
+        let mut found = context.ask(&structure, seed, rays, &body)?;
+        if found.failure.is_some() {
+            found = blame(&structure, found, &certain)?;
+        }
+        sum = sum.and(found);
+    }
+    Ok(sum)
+}
+
+/// Simplifies a missing hit and finds its triangle.
+fn blame(structure: &Structure, found: Outcome, certain: impl Fn(&Oracle, &Ray) -> bool) -> Result<Outcome> {
+    let oracle = Oracle::new(structure.renderer.scene())?;
+    let mut found = found.simplify(|ray, _| {
+        let whole = ray.t_min == 0.0 && ray.t_max == f32::INFINITY;
+        whole && certain(&oracle, ray) && !structure.ask(ray).is_hit()
+    });
+    if let Some(failure) = &mut found.failure
+        && let Some(ray) = failure.ray
+        && let Some(exact) = oracle.closest(&ray)
+    {
+        failure.triangle = oracle.triangle(exact.instance, exact.primitive).map(|(corners, _)| corners);
+        failure.what = missing(structure, &structure.ask(&ray));
+    }
+    Ok(found)
+}
+
+/// Whether a ray starts well inside a sphere of triangles and leads anywhere.
+fn is_inside(ray: &Ray, center: DVec3, radius: f64) -> bool {
+    // The coarsest of the spheres, rounded where it stands, contains 0.98 of its radius.
+    length(ray.origin.as_dvec3() - center) <= 0.97 * radius && ray.direction != Vec3::ZERO
 }
 
 /// A ray that starts within `half` of `center` per axis: at a vertex, at a point of an edge, at either along an axis, or
@@ -87,14 +142,20 @@ fn any_edge_point(mesh: &TriangleMesh, random: &mut Random) -> Vec3 {
 /// Counts a ray that must hit, asked for the closest hit and for any.
 fn must_hit(structure: &Structure, ray: &Ray, outcome: &mut Outcome) -> Answer {
     let answer = structure.ask(ray);
-    outcome.check(answer.is_hit(), || Failure::of_ray(ray, format!("{structure}: {answer}, where one is certain")));
+    outcome.check(answer.is_hit(), || Failure::of_ray(ray, missing(structure, &answer)));
     answer
+}
+
+fn missing(structure: &Structure, answer: &Answer) -> String {
+    format!("{structure}: {answer}, where one is certain")
 }
 
 /// From heights of 1e-6 to 1e6 above a grid of 100 x 100 quads to points on it, most of them on its edges and vertices,
 /// the grid lying across any axis.
 fn flat_grid(context: &Context<'_>) -> Result<Outcome> {
     const EACH: Rays = Rays { quick: 12_000, full: 3_400_000, linear: 500 };
+    // Targets keep away from the border, so that rounding the direction cannot lead a ray over it.
+    const INNER: f64 = 0.875;
     let mut sum = Outcome::default();
     for axis in 0..3 {
         // Turning the axes in a circle keeps the numbers of the vertices.
@@ -105,19 +166,25 @@ fn flat_grid(context: &Context<'_>) -> Result<Outcome> {
         };
         let scene = meshes::scene(vec![meshes::moved(&meshes::grid(100), to_world)]);
         let mesh = &scene.meshes[0];
-        sum = sum.and(context.ask_all(&scene, 0xd9 + axis, EACH, |structure, random, number, outcome| {
+        let certain = |oracle: &Oracle, ray: &Ray| {
+            oracle.closest(ray).is_some_and(|exact| {
+                let p = ray.origin.as_dvec3() + ray.direction.as_dvec3() * exact.t.to_f64();
+                p.abs().max_element() <= INNER
+            })
+        };
+        let seed = scene_seed(0xd9, axis);
+        sum = sum.and(all_hit(context, &scene, seed, EACH, certain, |structure, random, number, outcome| {
             // The rays are drawn over the plane z = 0 and turned with the grid.
             let flat = |random: &mut Random, half: f64| {
                 to_world(Vec3::new(random.between(-half, half) as f32, random.between(-half, half) as f32, 0.0))
             };
-            // Targets keep away from the border, so that rounding the direction cannot lead a ray over it.
             let target = loop {
                 let target = match number % 3 {
                     0 => any_vertex(mesh, random),
                     1 => any_edge_point(mesh, random),
                     _ => flat(random, 1.0),
                 };
-                if target.abs().max_element() <= 0.875 {
+                if target.as_dvec3().abs().max_element() <= INNER {
                     break target;
                 }
             };
@@ -133,17 +200,20 @@ fn flat_grid(context: &Context<'_>) -> Result<Outcome> {
 /// where that is more: vertices of a smaller one would coincide.
 ///
 /// A hit's point is computed in f32 as users do: from t, and from u and v. Its distance from the plane is counted in ulp
-/// of the largest coordinate of the point, and of the ray's origin for the former.
+/// of the largest coordinate of the point, and of the ray's origin for the former; its quantile is that of each distance and
+/// kind of structure by itself.
 fn far_spheres(context: &Context<'_>) -> Result<Outcome> {
     const EACH: Rays = Rays { quick: 9_000, full: 12_500_000, linear: 30 };
     let mut sum = Outcome::default();
-    let along = Histogram::default();
     for k in 0..8u32 {
         let distance = libm::pow(10.0, f64::from(k));
         let (center, radius) = (DVec3::new(distance, -distance, distance), f64::max(1.0, 1e-4 * distance));
         let scene = meshes::scene(vec![meshes::icosphere(3, radius, center)]);
         let mesh = &scene.meshes[0];
-        sum = sum.and(context.ask_all(&scene, 0xd13 + u64::from(k), EACH, |structure, random, number, outcome| {
+        let along: Vec<Histogram> = context.kinds.iter().map(|_| Histogram::default()).collect();
+        let certain = |_: &Oracle, ray: &Ray| is_inside(ray, center, radius);
+        let seed = scene_seed(0xd13, u64::from(k));
+        sum = sum.and(all_hit(context, &scene, seed, EACH, certain, |structure, random, number, outcome| {
             let ray = outward_ray(mesh, center, 0.5 * radius, random, number);
             let answer = must_hit(structure, &ray, outcome);
             if !answer.is_hit() {
@@ -156,15 +226,20 @@ fn far_spheres(context: &Context<'_>) -> Result<Outcome> {
             let p = ray.origin + ray.direction * hit.t;
             let largest = p.abs().max_element().max(ray.origin.abs().max_element());
             let error = off(p) / ulp(largest);
-            along.add(error);
+            let kind = context.kinds.iter().position(|kind| *kind == structure.params.kind);
+            kind.map(|kind| along[kind].add(error));
             outcome.figure("o + t d off the plane, in ulp, at most", error, Some(16.0));
             let [a, b, c] = corners;
             let p = a + (b - a) * hit.u + (c - a) * hit.v;
             let error = off(p) / ulp(p.abs().max_element());
             outcome.figure("A + u (B - A) + v (C - A) off the plane, in ulp, at most", error, Some(2.0));
         })?);
+        // One for each distance, the largest of all kinds.
+        for histogram in along {
+            let name = format!("o + t d off the plane, in ulp, 99 % of rays, at 1e{k}");
+            sum.figure(name, histogram.quantile(0.99), Some(4.0));
+        }
     }
-    sum.figure("o + t d off the plane, in ulp, 99 % of rays", along.quantile(0.99), Some(4.0));
     Ok(sum)
 }
 
