@@ -227,7 +227,9 @@ fn far_spheres(context: &Context<'_>) -> Result<Outcome> {
             let largest = p.abs().max_element().max(ray.origin.abs().max_element());
             let error = off(p) / ulp(largest);
             let kind = context.kinds.iter().position(|kind| *kind == structure.params.kind);
-            kind.map(|kind| along[kind].add(error));
+            if let Some(kind) = kind {
+                along[kind].add(error);
+            }
             outcome.figure("o + t d off the plane, in ulp, at most", error, Some(16.0));
             let [a, b, c] = corners;
             let p = a + (b - a) * hit.u + (c - a) * hit.v;
@@ -246,4 +248,31 @@ fn far_spheres(context: &Context<'_>) -> Result<Outcome> {
 /// The distance from one f32 to the next.
 fn ulp(x: f32) -> f64 {
     f64::from(x.next_up()) - f64::from(x)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::Params;
+    use crate::progress::Silent;
+
+    #[test]
+    fn failures_get_a_short_ray_and_the_triangle_that_it_meets() {
+        let scene = meshes::scene(vec![meshes::square()]);
+        let structure = Structure::build(&scene, Params::default(), &Silent).unwrap();
+        // As if a hit were certain that the interval, which must not change, excludes; the ray may pass the square too.
+        let mut found = Outcome::default();
+        let ray = Ray { t_max: 0.5, ..Ray::new(Vec3::new(0.3, 0.7, 3.3), Vec3::new(0.001, 0.002, -1.1)) };
+        found.check(false, || Failure::of_ray(&ray, "none"));
+        let kept = blame(&structure, found.clone(), |_, _| true).unwrap().failure.unwrap();
+        assert_eq!((kept.ray, kept.triangle), (Some(ray), None));
+        found.failure = Some(Failure::of_ray(&Ray::new(Vec3::new(0.3, 7.7, 3.3), ray.direction), "none"));
+        let kept = blame(&structure, found, |_, ray| ray.origin.y > 5.0 && ray.direction.z < 0.0).unwrap();
+        let ray = kept.failure.unwrap().ray.unwrap();
+        assert_eq!((ray.origin, ray.direction), (Vec3::new(0.0, 6.0, 0.0), Vec3::NEG_Z));
+        let through = Ray::new(Vec3::new(0.25, 0.5, 1.0), Vec3::NEG_Z);
+        let mut found = Outcome::default();
+        found.check(false, || Failure::of_ray(&through, "none"));
+        assert!(blame(&structure, found, |_, _| true).unwrap().failure.unwrap().triangle.is_some());
+    }
 }
