@@ -188,3 +188,16 @@ fn the_document_is_in_the_manual() {
     ];
     assert_documented(&found, &expected);
 }
+
+#[cfg(unix)]
+#[test]
+fn names_that_are_not_utf8_are_printed_as_well_as_can_be() {
+    use std::os::unix::ffi::OsStrExt;
+    let workshop = workshop();
+    let name = std::ffi::OsStr::from_bytes(b"caf\xe9.png");
+    std::fs::copy(workshop.path("a.png"), workshop.path("").join(name)).unwrap();
+    let output = workshop.command("diff a.png --json").arg(name).output().unwrap();
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let found: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(found["b"], "caf\u{fffd}.png");
+}

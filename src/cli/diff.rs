@@ -7,7 +7,7 @@ use clap::{Args, ValueHint};
 use serde::Serialize;
 
 use super::outputs::identity;
-use super::stats_json::SCHEMA;
+use super::stats_json::{SCHEMA, lossy};
 use super::terminal;
 use crate::error::{Error, Result};
 use crate::formats::atomic_file::check_writable;
@@ -42,7 +42,9 @@ pub struct DiffArguments {
 #[derive(Debug, Serialize)]
 struct Document<'a> {
     schema: u32,
+    #[serde(serialize_with = "lossy")]
     a: &'a Path,
+    #[serde(serialize_with = "lossy")]
     b: &'a Path,
     threshold: f64,
     #[serde(flatten)]

@@ -7,7 +7,7 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::arguments::InfoArguments;
-use super::stats_json::SCHEMA;
+use super::stats_json::{SCHEMA, lossy, lossy_list};
 use super::terminal::{self, Terminal};
 use super::{info_text, ledger};
 use crate::error::{Error, Result};
@@ -23,8 +23,10 @@ use crate::scene::{FilmSettings, LightKind, Scene};
 #[derive(Debug, Serialize)]
 pub struct Info<'a> {
     pub schema: u32,
+    #[serde(serialize_with = "lossy")]
     pub input: &'a Path,
     /// All files that were read.
+    #[serde(serialize_with = "lossy_list")]
     pub files: Vec<&'a Path>,
     pub triangles: Triangles,
     pub meshes: usize,

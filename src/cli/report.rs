@@ -10,7 +10,7 @@ use super::query::{FORMATS, open};
 use super::terminal::{self, Terminal};
 use super::values::{self, one_of};
 use super::{arguments, ledger};
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Result};
 use crate::formats::atomic_file::{check_writable, write_atomically};
 use crate::formats::{self, Loaded};
 use crate::measure::ray_file::{FileRay, RayReader, RecordFormat};
@@ -54,7 +54,7 @@ pub struct ReportArguments {
     /// How the ray file is written: text, one ray a line, or little-endian 32-bit words, eight a ray.
     #[arg(long, value_name = "FORMAT", value_parser = one_of(FORMATS), default_value = "text", requires = "ray_file")]
     pub format: RecordFormat,
-    /// Rays of each kind whose answers are judged; the smallest rate that can be told from 0 is about 3 over this.
+    /// Rays of each kind whose answers are judged; the smallest rate that can be told from 0 is about 3 over this, at 95 %.
     #[arg(long, value_name = "N", value_parser = values::count(1..=MOST_RAYS), default_value_t = 50_000)]
     pub rays: u32,
     /// Rays of each kind that are timed.
@@ -63,7 +63,7 @@ pub struct ReportArguments {
     /// How often each choice is timed: 10 at least, or 0 for errors without speeds.
     #[arg(long, value_name = "N", value_parser = repetitions, default_value_t = FEWEST_REPETITIONS)]
     pub repeat: u32,
-    /// Threads that find exact answers; 0 is one per processor. Speed is always that of one thread.
+    /// Threads that find exact answers and render pictures; 0 is one per processor. Rays a second are those of one thread.
     #[arg(long, value_name = "N", value_parser = values::count(0..=arguments::MOST_THREADS), default_value_t = 0)]
     pub threads: u32,
     /// How the inputs are read.
@@ -104,8 +104,8 @@ fn repetitions(text: &str) -> std::result::Result<u32, String> {
 /// Measures all parts and writes the report.
 ///
 /// # Errors
-/// An input that cannot be read or measured, a folder that cannot be written to; [`Error::cancelled`] after Ctrl-C, when
-/// the finished parts have been written.
+/// An input that cannot be read or measured, a folder that cannot be written to; [`Error::cancelled`] after Ctrl-C. What
+/// was finished until then is written.
 pub fn run(arguments: &ReportArguments) -> Result<()> {
     let folder = match &arguments.out {
         Some(folder) => Some(folder.clone()),
@@ -116,8 +116,7 @@ pub fn run(arguments: &ReportArguments) -> Result<()> {
         formats::is_scene(input)?;
     }
     if let Some(folder) = &folder {
-        fs::create_dir_all(folder).map_err(|cause| Error::system(folder, cause))?;
-        check_writable(&folder.join("report.md"))?;
+        check_folder(folder)?;
     }
     let options = options(arguments)?;
     super::use_threads(arguments.threads)?;
@@ -126,13 +125,14 @@ pub fn run(arguments: &ReportArguments) -> Result<()> {
     let mut report = Report::new(Environment::detect(commit(), SEED), &options);
     let mut stopped = None;
     for part in parts(arguments) {
-        let measured = part.load(arguments, &terminal).and_then(|subject| {
+        let measured = part.load(arguments, &terminal).and_then(|mut subject| {
             let given = file_rays.as_ref().map(|rays| RaySet {
                 name: "file".into(),
                 group: Group::Generic,
                 question: Question::Closest,
                 rays: rays.iter().map(|ray| subject.ray(ray)).collect(),
             });
+            subject.name = report.unused_name(&subject.name);
             report::measure(&subject, given.as_slice(), &options, &terminal)
         });
         terminal.clear();
@@ -149,7 +149,7 @@ pub fn run(arguments: &ReportArguments) -> Result<()> {
         terminal.clear();
     }
     report.complete = stopped.is_none();
-    if let Some(error) = stopped.take_if(|error| error.fault() != Fault::Cancelled || report.subjects.is_empty()) {
+    if let Some(error) = stopped.take_if(|_| report.is_empty()) {
         return Err(error);
     }
     if arguments.json {
@@ -172,7 +172,8 @@ enum Part<'a> {
 
 fn parts(arguments: &ReportArguments) -> impl Iterator<Item = Part<'_>> {
     let files = arguments.input.iter().map(|path| Part::File(path));
-    files.chain(arguments.hard_set.iter().map(|&set| Part::Hard(set)))
+    let given = |set: &HardSet| arguments.hard_set.contains(set);
+    files.chain(HardSet::ALL.into_iter().filter(given).map(Part::Hard))
 }
 
 impl Part<'_> {
@@ -241,8 +242,20 @@ fn read_rays(path: &Path, format: RecordFormat) -> Result<Vec<FileRay>> {
     }
 }
 
+/// Finds out whether a folder is there or can be made, and whether files can be written to it, without making it.
+fn check_folder(folder: &Path) -> Result<()> {
+    let nearest = folder.ancestors().find(|ancestor| ancestor.as_os_str().is_empty() || ancestor.exists());
+    match nearest {
+        Some(there) if there.is_dir() || there.as_os_str().is_empty() => check_writable(&there.join("report.md")),
+        _ => Err(Error::caller("is not a folder")
+            .at_path(nearest.unwrap_or(folder))
+            .remedy("give another name with --out")),
+    }
+}
+
 /// Writes the files, the page last: where it is new, all that it shows is there.
 fn write(report: &Report, folder: &Path) -> Result<()> {
+    fs::create_dir_all(folder).map_err(|cause| Error::system(folder, cause))?;
     for file in report.files() {
         let path = folder.join(&file.name);
         write_atomically(&path, |sink| {
@@ -252,8 +265,9 @@ fn write(report: &Report, folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// The commit of the checkout that the program was built in, with `-dirty` where files differ from it; `None` where the
-/// program is not in a checkout's folder of build products, or git is not there.
+/// The commit of the checkout that the program stands in, with `-dirty` where files differ from it now; it was built from
+/// that unless the checkout has changed since. `None` where the program is not in a checkout's folder of build products,
+/// or git is not there.
 fn commit() -> Option<String> {
     let program = std::env::current_exe().ok()?;
     let root = program.ancestors().skip(1).find(|folder| folder.join("Cargo.toml").is_file())?;

@@ -4,7 +4,7 @@
 use std::path::Path;
 use std::time::Instant;
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use super::precision::Precision;
 use crate::accel::Preset;
@@ -14,6 +14,21 @@ use crate::scene::{FilmSettings, Scene};
 /// Version of the documents that `--json` and `--stats-json` write.
 pub const SCHEMA: u32 = 1;
 
+/// Writes a path as text; what is not UTF-8 in it as replacement characters, since JSON holds nothing else.
+pub fn lossy<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(&path.display())
+}
+
+/// The same, or null.
+fn lossy_if_any<S: Serializer>(path: &Option<&Path>, serializer: S) -> Result<S::Ok, S::Error> {
+    path.map(|path| path.to_string_lossy()).serialize(serializer)
+}
+
+/// The same of a list.
+pub fn lossy_list<S: Serializer>(paths: &[&Path], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_seq(paths.iter().map(|path| path.to_string_lossy()))
+}
+
 /// The whole document.
 #[derive(Debug, Serialize)]
 pub struct Stats<'a> {
@@ -22,8 +37,10 @@ pub struct Stats<'a> {
     /// Version of the program.
     pub version: &'static str,
     /// The file that was rendered.
+    #[serde(serialize_with = "lossy")]
     pub input: &'a Path,
     /// The picture; null if it was streamed.
+    #[serde(serialize_with = "lossy_if_any")]
     pub output: Option<&'a Path>,
     /// What it was rendered with.
     pub settings: Settings<'a>,

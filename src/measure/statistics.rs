@@ -8,10 +8,13 @@ pub fn rate_bound(wrong: u64, total: u64) -> f64 {
     upper_bound(wrong, total, 0.05)
 }
 
-/// The two-sided 95 % interval of a rate (Clopper and Pearson 1934).
+/// The 95 % interval of a rate (Clopper and Pearson 1934): two-sided; where none was wrong, from 0 to the one-sided
+/// [`rate_bound`].
 pub fn rate_interval(wrong: u64, total: u64) -> (f64, f64) {
-    let low = if wrong == 0 { 0.0 } else { 1.0 - upper_bound(total - wrong, total, 0.025) };
-    (low, upper_bound(wrong, total, 0.025))
+    if wrong == 0 {
+        return (0.0, rate_bound(0, total));
+    }
+    (1.0 - upper_bound(total - wrong, total, 0.025), upper_bound(wrong, total, 0.025))
 }
 
 /// The rate at which seeing `wrong` or fewer has probability `tail`.
@@ -147,6 +150,7 @@ mod tests {
             let (low, high) = rate_interval(k, n);
             assert!((at_most(high) - 0.025).abs() < 1e-9 && low < k as f64 / n as f64 && high > bound);
         }
+        assert_eq!(rate_interval(0, 1000), (0.0, rate_bound(0, 1000)));
         // 2 of 10: the textbook interval.
         let (low, high) = rate_interval(2, 10);
         assert!((low - 0.02521).abs() < 1e-4 && (high - 0.55610).abs() < 1e-4, "{low} {high}");

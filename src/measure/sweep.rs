@@ -2,7 +2,7 @@
 
 use crate::measure::statistics::{Median, rate_interval};
 
-/// A counted error with its exact 95 % interval (Clopper and Pearson 1934).
+/// A counted error with its exact 95 % interval (Clopper and Pearson 1934); where none was counted, the one-sided bound.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Rate {
     /// Answers that are wrong.
@@ -27,7 +27,7 @@ impl Rate {
 }
 
 impl std::fmt::Display for Rate {
-    /// `1.2e5 (0.9e5 to 1.6e5; 12 of 100000)`, or `0 (below 3.7e4; 0 of 100000)`.
+    /// `1.2e5 (0.9e5 to 1.6e5; 12 of 100000)`, or `0 (below 3.0e4; 0 of 100000)`.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { wrong, total, per_1e9, low, high } = *self;
         if total == 0 {
@@ -40,35 +40,59 @@ impl std::fmt::Display for Rate {
     }
 }
 
-/// What one choice costs and what it gets wrong: two numbers that are never made one.
+/// Where an error certainly lies.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Range {
+    /// At least this.
+    pub low: f64,
+    /// At most this.
+    pub high: f64,
+}
+
+impl Range {
+    /// The interval that is printed with a rate.
+    pub fn of_rate(rate: &Rate) -> Self {
+        Self { low: rate.low, high: rate.high }
+    }
+
+    /// A number that is known.
+    pub fn exactly(error: f64) -> Self {
+        Self { low: error, high: error }
+    }
+}
+
+/// What one choice costs and what it gets wrong: numbers that are never made one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cost {
     /// Larger is better.
     pub speed: Median,
-    /// Smaller is better.
-    pub error: f64,
+    /// Two kinds of errors, the same twice where there is but one; smaller is better.
+    pub errors: [Range; 2],
 }
 
 impl Cost {
     /// What takes some time each; the shorter the better. Times that were not measured are all alike.
-    pub fn of_time(time: Option<Median>, error: f64) -> Self {
+    pub fn of_time(time: Option<Median>, errors: [Range; 2]) -> Self {
         let rate = |seconds: f64| 1.0 / seconds;
         let untimed = Median { value: 0.0, low: 0.0, high: 0.0 };
         let speed =
             time.map_or(untimed, |time| Median { value: rate(time.value), low: rate(time.high), high: rate(time.low) });
-        Self { speed, error }
+        Self { speed, errors }
     }
 }
 
-/// Which choices are dominated: another one is no worse in both and better in one.
+/// Which choices are dominated: another one is no worse in speed and in both kinds of errors, and better in one of them.
 ///
-/// Speeds whose intervals overlap are equal, so that noise dominates nobody. NaN errors dominate nothing and are
-/// dominated by every other choice that is no slower.
+/// What has overlapping intervals is equal, speeds and errors alike, so that noise dominates nobody. NaN errors dominate
+/// nothing and are dominated by every other choice that is no slower.
 pub fn dominated(costs: &[Cost]) -> Vec<bool> {
     let faster = |a: &Cost, b: &Cost| a.speed.low > b.speed.high;
+    let unknown = |error: &Range| error.low.is_nan() || error.high.is_nan();
+    let smaller = |a: &Range, b: &Range| a.high < b.low || (unknown(b) && !unknown(a));
     let beats = |a: &Cost, b: &Cost| {
-        let more_right = a.error < b.error || (b.error.is_nan() && !a.error.is_nan());
-        let no_less_right = more_right || a.error == b.error;
+        let kinds = || a.errors.iter().zip(&b.errors);
+        let no_less_right = kinds().all(|(a, b)| !unknown(a) && !smaller(b, a));
+        let more_right = kinds().any(|(a, b)| smaller(a, b));
         no_less_right && !faster(b, a) && (more_right || faster(a, b))
     };
     costs.iter().map(|own| costs.iter().any(|other| beats(other, own))).collect()
@@ -79,7 +103,10 @@ mod tests {
     use super::*;
 
     fn cost(speed: f64, error: f64) -> Cost {
-        Cost { speed: Median { value: speed, low: speed * 0.95, high: speed * 1.05 }, error }
+        Cost {
+            speed: Median { value: speed, low: speed * 0.95, high: speed * 1.05 },
+            errors: [Range::exactly(error); 2],
+        }
     }
 
     #[test]
@@ -95,8 +122,20 @@ mod tests {
     }
 
     #[test]
+    fn errors_that_cannot_be_told_apart_are_equal_and_kinds_are_not_added() {
+        let counted = |speed: f64, wrong: [u64; 2]| Cost {
+            errors: wrong.map(|wrong| Range::of_rate(&Rate::new(wrong, 50_000))),
+            ..cost(speed, 0.0)
+        };
+        // One in 50,000 may be none in the next; ten more misses are not made good by ten fewer false hits.
+        assert_eq!(dominated(&[counted(1.0, [0, 0]), counted(1.0, [1, 0])]), [false, false]);
+        assert_eq!(dominated(&[counted(1.0, [0, 0]), counted(1.0, [10, 0])]), [false, true]);
+        assert_eq!(dominated(&[counted(1.0, [0, 20]), counted(2.0, [20, 0])]), [false, false]);
+    }
+
+    #[test]
     fn rates_print_what_they_were_counted_from() {
-        assert_eq!(Rate::new(0, 100_000).to_string(), "0 (below 3.7e4; 0 of 100000)");
+        assert_eq!(Rate::new(0, 100_000).to_string(), "0 (below 3.0e4; 0 of 100000)");
         assert_eq!(Rate::new(0, 0).to_string(), "not measured");
         assert_eq!(Rate::new(2, 10).to_string(), "2.0e8 (2.5e7 to 5.6e8; 2 of 10)");
     }

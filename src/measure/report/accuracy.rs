@@ -10,7 +10,7 @@ use crate::geometry::{Hit, Ray, TriangleMesh};
 use crate::math::float::UNIT_ROUNDOFF;
 use crate::math::vector::{cross, dot, length};
 use crate::measure::statistics::{Median, quantile};
-use crate::measure::sweep::{Cost, dominated};
+use crate::measure::sweep::{Cost, Range, dominated};
 
 /// One choice's errors on the hits of one group of rays.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -161,7 +161,7 @@ fn ns_per_ray(rows: &[QueryRow], group: Group, name: &str) -> Option<Median> {
 }
 
 fn cost(row: &AccuracyRow) -> Cost {
-    Cost::of_time(row.ns_per_ray, row.t_normalized.p99_99)
+    Cost::of_time(row.ns_per_ray, [Range::exactly(row.t_normalized.p99_99); 2])
 }
 
 /// The distance of f32 numbers at a value.

@@ -7,9 +7,9 @@ use crate::error::Result;
 use crate::geometry::{Hit, Ray};
 use crate::measure::variants::baldwin_weber::BaldwinWeber;
 use crate::measure::variants::moller_trumbore::{MollerTrumbore, MollerTrumboreF64};
-use crate::measure::variants::slab::{Padded, Plain};
+use crate::measure::variants::slab::{Ize, Padded, Plain};
 use crate::measure::variants::tree::{Skeleton, VariantTree};
-use crate::measure::variants::woop::{Kahan, Published, Wide, Woop, WoopClamped};
+use crate::measure::variants::woop::{Kahan, Narrow, Published, Wide, Woop, WoopClamped};
 use crate::measure::variants::{BoxTest, TriangleTest};
 use crate::progress::{Progress, Silent};
 use crate::render::Renderer;
@@ -103,12 +103,20 @@ pub fn all<'a>(
     let triangles = scene.meshes[0].live_count();
     let mut choices = Vec::new();
     macro_rules! combine {
-        ($($test:ty),+) => {$(
-            choices.push(combination::<$test, Padded>(skeleton, skeleton_seconds, triangles));
-            choices.push(combination::<$test, Plain>(skeleton, skeleton_seconds, triangles));
-        )+};
+        ($($test:ty: $($box_test:ty),+;)+) => {$($(
+            choices.push(combination::<$test, $box_test>(skeleton, skeleton_seconds, triangles));
+        )+)+};
     }
-    combine!(WoopClamped, Woop<Published>, Woop<Wide>, Woop<Kahan>, MollerTrumbore, BaldwinWeber, MollerTrumboreF64);
+    combine!(
+        WoopClamped: Padded, Ize, Plain;
+        Woop<Published>: Padded, Ize, Plain;
+        Woop<Narrow>: Padded, Plain;
+        Woop<Wide>: Padded, Plain;
+        Woop<Kahan>: Padded, Plain;
+        MollerTrumbore: Padded, Plain;
+        BaldwinWeber: Padded, Plain;
+        MollerTrumboreF64: Padded, Plain;
+    );
     for &kind in Kind::ALL {
         let presets = match kind {
             Kind::Linear if triangles > MOST_LINEAR => continue,

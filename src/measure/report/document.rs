@@ -18,28 +18,29 @@ use crate::measure::table::Table;
 pub fn markdown(report: &Report, pictures: &[File]) -> String {
     let mut page = String::from("# Speed against error\n\n");
     if !report.complete {
-        page += "**Interrupted: parts are missing.**\n\n";
+        page += "**Not complete: parts are missing.**\n\n";
     }
     page += "Each choice of triangle test, box test and tree, its speed beside its error; dominated choices stay. \
              The manual's page on reports says how to read this and what was not modelled.\n\n";
     page += &measured_on(report);
     for subject in &report.subjects {
         let _ = writeln!(page, "\n## {}\n", subject.name);
-        page += &of_subject(subject, pictures);
+        page += &of_subject(report, subject, pictures);
     }
-    page += &own_scenes::spheres(&report.spheres, pictures);
+    page += &own_scenes::spheres(report, pictures);
     page += &own_scenes::light_paths(&report.light_paths);
     page += &own_scenes::features(&report.features);
     page
 }
 
 fn measured_on(report: &Report) -> String {
-    let Environment { version, commit, machine, cpu, processors, seed, .. } = &report.environment;
+    let Environment { version, commit, rustflags, machine, cpu, processors, seed, .. } = &report.environment;
     let mut table = Table::new(&["measured on", ""]);
     let mut row = |what: &str, value: String| table.push(vec![what.into(), value]);
     let build = if !machine.debug_assertions { "optimised" } else { "**not optimised: speeds say nothing**" };
-    let commit = commit.as_deref().unwrap_or("not known");
-    row("program", format!("whitted {version}, commit {commit}, {build}"));
+    row("program", format!("whitted {version}, {build}"));
+    row("checkout around it when it was run", commit.as_deref().unwrap_or("none").into());
+    row("RUSTFLAGS when it was compiled", rustflags.map_or("not set".into(), |flags| format!("`{flags}`")));
     row("compiled for", format!("{}; {}", machine.target, machine.compiled_features.join(", ")));
     row("processor", format!("{cpu} ({processors} processors); has {}", machine.cpu_features.join(", ")));
     let flushed = |on: bool| if on { "on" } else { "off" };
@@ -48,18 +49,18 @@ fn measured_on(report: &Report) -> String {
         "flush to zero, denormals are zero",
         format!("{}, {}; no fused multiply-add", flushed(zero.0), flushed(zero.1)),
     );
-    row("threads", format!("1 for speed, {} for exact answers", machine.threads));
+    row("threads", format!("1 for the speed of rays, {} for exact answers and pictures", machine.threads));
     row("seed", format!("{seed:#x}"));
     row("rays of each kind", format!("{} judged, the first {} timed", report.rays, report.rays_timed));
     row(
         "repetitions",
         format!("{} interleaved forward and backward; median and 95 % bootstrap interval", report.repetitions),
     );
-    row("rates", "in 1e9 rays, with the 95 % interval of Clopper and Pearson".into());
+    row("rates", "in 1e9 rays, with the 95 % interval of Clopper and Pearson; one-sided where none was wrong".into());
     table.to_string()
 }
 
-fn of_subject(subject: &SubjectReport, pictures: &[File]) -> String {
+fn of_subject(report: &Report, subject: &SubjectReport, pictures: &[File]) -> String {
     let mut text = format!("{} triangles.", subject.triangles);
     if subject.quadrics_left_out > 0 {
         let _ = write!(text, " {} quadrics are left out of these rays.", subject.quadrics_left_out);
@@ -67,7 +68,7 @@ fn of_subject(subject: &SubjectReport, pictures: &[File]) -> String {
     text += "\n\n";
     text += &conclusion(subject);
     if subject.query.is_empty() {
-        text += &spawn_section(&subject.spawn);
+        text += &spawn_section(report, &subject.spawn);
         text += &image_section(subject, pictures);
         return text;
     }
@@ -96,17 +97,22 @@ fn of_subject(subject: &SubjectReport, pictures: &[File]) -> String {
         for set in sets {
             let rows: Vec<&QueryRow> = subject.query.iter().filter(|row| row.ray_kind == set.ray_kind).collect();
             let _ = writeln!(text, "\n**{}** ({})\n", set.ray_kind, question(set.question));
+            if rows.is_empty() {
+                text += "No such rays could be made.\n";
+                continue;
+            }
             text += &query_table(&rows).to_string();
         }
         let rows: Vec<&AccuracyRow> = subject.accuracy.iter().filter(|row| row.group == group).collect();
         if !rows.is_empty() {
             let _ = writeln!(text, "\n### Accuracy plane, {} rays\n", group.name());
             text += &picture(&name("accuracy", &subject.name, group), pictures);
-            text += "\nErrors are 50 % / 99 % / 99.99 % quantiles and the maximum, of hits on the exact triangle.\n\n";
+            text += "\nErrors are 50 % / 99 % / 99.99 % quantiles and the maximum, of hits on the exact triangle. Choices hit different \
+                     ones: where one is wrong or missed, it has no error here.\n\n";
             text += &accuracy_table(&rows).to_string();
         }
     }
-    text += &spawn_section(&subject.spawn);
+    text += &spawn_section(report, &subject.spawn);
     text += &image_section(subject, pictures);
     text
 }
@@ -149,7 +155,7 @@ fn conclusion(subject: &SubjectReport) -> String {
 
 fn choices_table(subject: &SubjectReport) -> Table {
     let mut table = Table::new(&["choice", "triangle test", "box test", "tree", ">build s", ">bytes a triangle"]);
-    let first = subject.ray_sets.first().map(|set| set.ray_kind.as_str());
+    let first = subject.query.first().map(|row| row.ray_kind.as_str());
     for row in subject.query.iter().filter(|row| Some(row.ray_kind.as_str()) == first) {
         let label = &row.label;
         let mark = if label.default { " (default)" } else { "" };
@@ -211,7 +217,8 @@ fn accuracy_table(rows: &[&AccuracyRow]) -> Table {
     table
 }
 
-fn spawn_section(rows: &[SpawnRow]) -> String {
+fn spawn_section(report: &Report, rows: &[SpawnRow]) -> String {
+    let Report { rays, rays_timed, .. } = report;
     let headings = [
         "place",
         "start",
@@ -238,7 +245,7 @@ fn spawn_section(rows: &[SpawnRow]) -> String {
     }
     format!(
         "\n### Rays that leave a surface\n\nFrom random points of triangles, away from them in random directions: a hit on \
-         the same triangle is wrong. The renderer's start comes with all that shading needs of the point; the others' \
+         the same triangle is wrong. Up to {rays} at a place, the first {rays_timed} of them timed. The renderer's start comes with all that shading needs of the point; the others' \
          times are of the start alone.\n\n{table}"
     )
 }

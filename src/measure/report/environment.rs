@@ -9,8 +9,10 @@ use crate::measure::machine::Machine;
 pub struct Environment {
     /// Version of this program.
     pub version: &'static str,
-    /// The commit that it was built from, if that is known.
+    /// The commit of the checkout that the program stands in when it measures, if there is one.
     pub commit: Option<String>,
+    /// What was in `RUSTFLAGS` when it was compiled; null if that was not set.
+    pub rustflags: Option<&'static str>,
     /// The build and the processor's instruction sets; its threads find exact answers, speed is that of one.
     #[serde(flatten)]
     pub machine: Machine,
@@ -32,6 +34,7 @@ impl Environment {
         Self {
             version: env!("CARGO_PKG_VERSION"),
             commit,
+            rustflags: option_env!("RUSTFLAGS"),
             machine: Machine::this(),
             cpu: cpu(),
             processors: std::thread::available_parallelism().map_or(1, usize::from),

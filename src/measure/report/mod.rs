@@ -187,6 +187,14 @@ pub struct RaySetReport {
     pub ray_set_hash: String,
 }
 
+impl RaySetReport {
+    fn new(set: &RaySet, exact_hits: usize) -> Self {
+        let RaySet { name, group, question, rays } = set;
+        let (ray_kind, rays) = (name.clone(), rays.len());
+        Self { ray_kind, group: *group, question: *question, rays, exact_hits, ray_set_hash: set.hash() }
+    }
+}
+
 /// A file of a report.
 #[derive(Debug, Clone, PartialEq)]
 pub struct File {
@@ -214,13 +222,27 @@ impl Report {
         }
     }
 
+    /// Whether nothing was measured yet.
+    pub fn is_empty(&self) -> bool {
+        self.subjects.is_empty() && self.spheres.is_empty() && self.light_paths.is_empty() && self.features.is_empty()
+    }
+
+    /// A name for the next subject under which no other one's pictures are: `name`, or `name-2` and so on.
+    pub fn unused_name(&self, name: &str) -> String {
+        // Some file systems take large and small letters for the same.
+        let file = |name: &str| pictures::plain(name).to_lowercase();
+        let used = |name: &str| self.subjects.iter().any(|subject| file(&subject.name) == file(name));
+        let numbered = (2..).map(|number| format!("{name}-{number}"));
+        std::iter::once(name.to_owned()).chain(numbered).find(|name| !used(name)).unwrap_or_default()
+    }
+
     /// Measures what needs no scene of the user's.
     ///
     /// # Errors
     /// A cancellation; where instructions are counted, what [`features::count`] says.
     pub fn measure_own_scenes(&mut self, options: &Options, progress: &dyn Progress) -> Result<()> {
         if options.planes.contains(&Plane::Quadric) {
-            self.spheres = spheres::measure(options.effort.rays_timed, options.effort.repetitions, progress)?;
+            self.spheres = spheres::measure(options.rays, options.effort, progress)?;
         }
         if options.planes.contains(&Plane::Light) {
             progress.begin("light", (SCALES.len() * DISTANCES.len()) as u64);
@@ -275,7 +297,7 @@ pub fn measure(
         match plane {
             Plane::Query => measure_query(subject, given, options, &mut report, progress)?,
             Plane::Spawn => {
-                report.spawn = spawn::measure(subject, options.rays, options.effort.repetitions, progress)?;
+                report.spawn = spawn::measure(subject, options.rays, options.effort, progress)?;
             }
             Plane::Image => report.image = image::measure(subject, options.effort.repetitions, progress)?,
             Plane::Quadric | Plane::Light | Plane::Features => {}
@@ -300,19 +322,17 @@ fn measure_query(
     let renderer = Renderer::build(subject.scene.clone(), &Params::default(), progress)?;
 
     let mut accuracy = Accuracy::new(mesh, &judge, choices.len());
-    let made = options.kinds.iter().map(|kind| kind.rays(&renderer, options.rays)).collect::<Result<Vec<_>>>()?;
-    for set in made.iter().chain(given).filter(|set| !set.rays.is_empty()) {
+    let made =
+        options.kinds.iter().map(|kind| kind.rays(&renderer, options.rays, progress)).collect::<Result<Vec<_>>>()?;
+    for set in made.iter().chain(given) {
+        if set.rays.is_empty() {
+            report.ray_sets.push(RaySetReport::new(set, 0));
+            continue;
+        }
         let asked = query::ask(&choices, set, &judge, options.effort, progress)?;
         report.query.extend(query::rows(&choices, &asked, &judge, progress)?);
         accuracy.add(&asked);
-        report.ray_sets.push(RaySetReport {
-            ray_kind: set.name.clone(),
-            group: set.group,
-            question: set.question,
-            rays: set.rays.len(),
-            exact_hits: asked.truths.iter().flatten().count(),
-            ray_set_hash: set.hash(),
-        });
+        report.ray_sets.push(RaySetReport::new(set, asked.truths.iter().flatten().count()));
     }
     report.accuracy = accuracy.rows(&choices, &report.query);
     Ok(())

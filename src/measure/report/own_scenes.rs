@@ -1,15 +1,15 @@
 //! The part of the page about scenes of the report's own: quadrics, shadows and mirrors, features.
 
-use super::File;
 use super::document::{interval, picture, short, spread};
 use super::pictures::SPHERES;
-use super::spheres::SphereRow;
+use super::{File, Report};
 use crate::measure::features::FeatureCost;
 use crate::measure::light_paths::{BOUNCES, LightPaths};
 use crate::measure::table::Table;
 
 /// The section on quadrics; empty if they were not measured.
-pub fn spheres(rows: &[SphereRow], pictures: &[File]) -> String {
+pub fn spheres(report: &Report, pictures: &[File]) -> String {
+    let Report { spheres: rows, rays, rays_timed, .. } = report;
     if rows.is_empty() {
         return String::new();
     }
@@ -43,7 +43,8 @@ pub fn spheres(rows: &[SphereRow], pictures: &[File]) -> String {
     let shown = picture(SPHERES, pictures);
     format!(
         "\n## Quadrics\n\nA sphere of radius 1, seen from around zero. Generic rays go through a disc half as large again, \
-         adversarial ones within a millionth of its outline. Hits and t are compared with exact ones; \
+         adversarial ones within a millionth of its outline: \
+         {rays} at each distance, the first {rays_timed} of them timed. Hits and t are compared with exact ones; \
          |F| / |grad F| is how far `o + t d` is from the surface, which the rounding of t alone makes large far away: the \
          renderer solves for the point again. Quantiles as above.\n\n{shown}\n{table}"
     )

@@ -9,6 +9,8 @@ use super::spheres::SphereRow;
 use super::{File, Report, SubjectReport};
 use crate::measure::plot::{Height, Mark, Panel, Point, Scatter, scatter};
 use crate::measure::sweep::Rate;
+use crate::measure::variants::BoxTest;
+use crate::measure::variants::slab::Ize;
 use crate::measure::variants::sphere::SphereTest;
 
 /// The picture of quadrics.
@@ -26,7 +28,7 @@ pub fn all(report: &Report) -> Vec<File> {
 }
 
 /// A name without what file systems or links do not like.
-fn plain(name: &str) -> String {
+pub fn plain(name: &str) -> String {
     let allowed = |c: char| if c.is_ascii_alphanumeric() || c == '-' || c == '_' { c } else { '_' };
     name.chars().map(allowed).collect()
 }
@@ -178,7 +180,7 @@ fn point(label: &Label, x: [f64; 3], y: Height) -> Point {
         _ => Mark::Circle,
     };
     // In the order of the choices; the renderer's test is the first.
-    const TESTS: [&str; 7] = [
+    const TESTS: [&str; 8] = [
         "Woop (ours)",
         "Woop 2013",
         "Möller-Trumbore",
@@ -186,11 +188,13 @@ fn point(label: &Label, x: [f64; 3], y: Height) -> Point {
         "Baldwin-Weber",
         "Möller-Trumbore f64",
         "Woop Kahan",
+        "Woop f32 edges",
     ];
     let color = TESTS.iter().position(|test| *test == label.triangle_test).unwrap_or(TESTS.len());
     let text = match mark {
         Mark::Diamond => label.name.clone(),
         Mark::Square => format!("{}, plain", label.triangle_test),
+        _ if label.box_test == Ize::NAME => format!("{}, Ize", label.triangle_test),
         _ => label.triangle_test.to_owned(),
     };
     Point { label: text, x, y, color, mark }

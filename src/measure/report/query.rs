@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::geometry::{Hit, Ray};
 use crate::measure::speed::{interleaved, millions_per_second};
 use crate::measure::statistics::Median;
-use crate::measure::sweep::{Cost, Rate, dominated};
+use crate::measure::sweep::{Cost, Range, Rate, dominated};
 use crate::progress::Progress;
 
 /// Rays that are worked on together: few enough to stop soon.
@@ -165,8 +165,7 @@ fn time(
     let seconds = interleaved(&mut pieces, effort.repetitions, progress)?;
     drop(work);
     for ((timed, judged), choice) in timed.iter().zip(judged).zip(choices) {
-        let [now, before] = [timed, judged].map(|answers| answers.hits_in_first(rays.len()));
-        assert_eq!(now, before, "{} answers otherwise when it is timed", choice.label.name);
+        assert!(judged.begins_with(timed), "{} answers otherwise when it is timed", choice.label.name);
     }
     Ok(seconds.into_iter().map(|seconds| Some(millions_per_second(rays.len(), seconds))).collect())
 }
@@ -204,7 +203,8 @@ pub fn rows(
     }
     let cost = |row: &QueryRow| {
         let untimed = Median { value: 0.0, low: 0.0, high: 0.0 };
-        Cost { speed: row.mrays_per_s.unwrap_or(untimed), error: (row.misses.wrong + row.false_hits.wrong) as f64 }
+        let errors = [&row.misses, &row.false_hits].map(Range::of_rate);
+        Cost { speed: row.mrays_per_s.unwrap_or(untimed), errors }
     };
     let dominated = dominated(&rows.iter().map(cost).collect::<Vec<_>>());
     rows.iter_mut().zip(dominated).for_each(|(row, dominated)| row.dominated = dominated);

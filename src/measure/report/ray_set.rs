@@ -73,6 +73,15 @@ impl Answered {
         }
     }
 
+    /// Whether the first answers are these.
+    pub fn begins_with(&self, first: &Self) -> bool {
+        match (self, first) {
+            (Self::Closest(all), Self::Closest(first)) => all.starts_with(first),
+            (Self::Occluded(all), Self::Occluded(first)) => all.starts_with(first),
+            _ => false,
+        }
+    }
+
     /// A fingerprint of the answers as `query` writes them: t, u, v, instance and primitive, or 0 and 1, 32 bits each.
     pub fn hash(&self) -> String {
         match self {
@@ -108,6 +117,9 @@ mod tests {
         let hit = Hit { t: 1.0, u: 0.25, v: 0.5, instance: 0, primitive: 3 };
         let answers = Answered::Closest(vec![hit, Hit::MISS]);
         assert_eq!((answers.hits_in_first(1), answers.hits_in_first(2)), (1, 1));
+        let first = |hit: Hit| Answered::Closest(vec![hit]);
+        assert!(answers.begins_with(&first(hit)) && !answers.begins_with(&first(Hit { primitive: 4, ..hit })));
+        assert!(!answers.begins_with(&Answered::Occluded(Vec::new())));
         let other = Answered::Closest(vec![Hit { t: 1.0f32.next_up(), ..hit }, Hit::MISS]);
         assert_ne!(answers.hash(), other.hash());
         assert_ne!(Answered::Occluded(vec![true]).hash(), Answered::Occluded(vec![false]).hash());

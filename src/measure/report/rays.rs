@@ -7,6 +7,7 @@ use crate::error::Result;
 use crate::geometry::{Ray, TriangleMesh};
 use crate::math::random::Random;
 use crate::math::vector::{dot, length};
+use crate::progress::Progress;
 use crate::render::Renderer;
 use crate::render::surface::SurfacePoint;
 use crate::scene::camera::ViewRay;
@@ -76,13 +77,13 @@ impl RayKind {
     /// `renderer` holds a scene of one untransformed mesh.
     ///
     /// # Errors
-    /// A degenerate camera.
-    pub fn rays(self, renderer: &Renderer, count: usize) -> Result<RaySet> {
+    /// A degenerate camera, or a cancellation.
+    pub fn rays(self, renderer: &Renderer, count: usize, progress: &dyn Progress) -> Result<RaySet> {
         let scene = renderer.scene();
         let mut random = Random::new(SEED, self as u64);
         let rays = match self {
             Self::Primary => views(scene, count, &mut random)?.iter().map(ray_of).collect(),
-            Self::Shadow | Self::Reflection => self.spawned(renderer, count, &mut random)?,
+            Self::Shadow | Self::Reflection => self.spawned(renderer, count, &mut random, progress)?,
             Self::Random => {
                 let place = Places::of(&scene.meshes[0]);
                 let ray = |_| Ray::new(place.around(&mut random).as_vec3(), random.direction().as_vec3());
@@ -95,15 +96,25 @@ impl RayKind {
     }
 
     /// Rays that leave what primary rays hit.
-    fn spawned(self, renderer: &Renderer, count: usize, random: &mut Random) -> Result<Vec<Ray>> {
+    fn spawned(
+        self,
+        renderer: &Renderer,
+        count: usize,
+        random: &mut Random,
+        progress: &dyn Progress,
+    ) -> Result<Vec<Ray>> {
         let scene = renderer.scene();
         let mut rays = Vec::with_capacity(count);
         // A camera may see little of the scene: give up after this many rounds.
         const ROUNDS: usize = 16;
         for _ in 0..ROUNDS {
             for view in views(scene, count, random)? {
+                if rays.len() == count {
+                    return Ok(rays);
+                }
+                progress.check()?;
                 let hit = renderer.closest(&ray_of(&view));
-                if !hit.is_hit() || rays.len() == count {
+                if !hit.is_hit() {
                     continue;
                 }
                 let point = SurfacePoint::of(scene, renderer.world(), &view, &hit);

@@ -9,10 +9,11 @@ use crate::geometry::{Hit, Ray, TriangleMesh};
 use crate::math::random::Random;
 use crate::math::vector::{cross, dot, length, normalize};
 use crate::measure::report::accuracy::ulp;
+use crate::measure::report::query::Effort;
 use crate::measure::report::rays::SEED;
 use crate::measure::speed::interleaved;
 use crate::measure::statistics::Median;
-use crate::measure::sweep::{Cost, Rate, dominated};
+use crate::measure::sweep::{Cost, Range, Rate, dominated};
 use crate::measure::variants::spawn::Spawn;
 use crate::progress::Progress;
 use crate::render::Renderer;
@@ -34,7 +35,7 @@ pub struct SpawnRow {
     pub below: Rate,
     /// Mean height of the start above the triangle, in f32 ulp of the place's largest coordinate.
     pub mean_clearance_ulp: f64,
-    /// Whether another way is no slower and has no more self-hits, and is better in one.
+    /// Whether another way is no slower and has no more self-hits or starts below, and is better in one.
     pub dominated: bool,
 }
 
@@ -72,6 +73,7 @@ impl Place {
         let mut starts = Vec::with_capacity(count);
         let around = bounds.center() + from;
         for _ in 0..count {
+            progress.check()?;
             let [a, b, c] = mesh.triangle(live[random.below(live.len() as u64) as usize]).map(|p| p.as_dvec3());
             let (u, v) = (random.unit(), random.unit());
             let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
@@ -124,11 +126,12 @@ fn outward(mesh: &TriangleMesh, ray: &Ray, triangle: u32) -> DVec3 {
     if dot(normal, ray.direction.as_dvec3()) > 0.0 { -normal } else { normal }
 }
 
-/// Compares all ways to start rays on a subject where it is, far from the origin, and seen from far away.
+/// Compares all ways to start rays on a subject where it is, far from the origin, and seen from far away, with `count`
+/// rays at most, of which the first ones are timed.
 ///
 /// # Errors
 /// A cancellation.
-pub fn measure(subject: &Subject, count: usize, repetitions: u32, progress: &dyn Progress) -> Result<Vec<SpawnRow>> {
+pub fn measure(subject: &Subject, count: usize, effort: Effort, progress: &dyn Progress) -> Result<Vec<SpawnRow>> {
     let mesh = subject.mesh();
     let size = length(mesh.bounds().size());
     let far = DVec3::new(0.6, -0.48, 0.64) * (FAR * size);
@@ -139,7 +142,7 @@ pub fn measure(subject: &Subject, count: usize, repetitions: u32, progress: &dyn
     ];
     let mut rows = Vec::new();
     for place in &places {
-        let times = time(place, repetitions, progress)?;
+        let times = time(place, effort, progress)?;
         let mut own = Vec::new();
         for (way, ns_per_start) in Spawn::ALL.into_iter().zip(times) {
             let (again, below, clearance) = place.count(way, progress)?;
@@ -155,7 +158,7 @@ pub fn measure(subject: &Subject, count: usize, repetitions: u32, progress: &dyn
                 dominated: false,
             });
         }
-        let cost = |row: &SpawnRow| Cost::of_time(row.ns_per_start, row.self_hits.wrong as f64);
+        let cost = |row: &SpawnRow| Cost::of_time(row.ns_per_start, [&row.self_hits, &row.below].map(Range::of_rate));
         let dominated = dominated(&own.iter().map(cost).collect::<Vec<_>>());
         own.iter_mut().zip(dominated).for_each(|(row, dominated)| row.dominated = dominated);
         rows.extend(own);
@@ -164,13 +167,15 @@ pub fn measure(subject: &Subject, count: usize, repetitions: u32, progress: &dyn
 }
 
 /// Nanoseconds a start.
-fn time(place: &Place, repetitions: u32, progress: &dyn Progress) -> Result<Vec<Option<Median>>> {
-    if repetitions == 0 || place.starts.is_empty() {
+fn time(place: &Place, effort: Effort, progress: &dyn Progress) -> Result<Vec<Option<Median>>> {
+    let Effort { rays_timed, repetitions } = effort;
+    let starts = &place.starts[..rays_timed.min(place.starts.len())];
+    if repetitions == 0 || starts.is_empty() {
         return Ok(vec![None; Spawn::ALL.len()]);
     }
     let mut work = Spawn::ALL.map(|way| {
         move || {
-            for start in &place.starts {
+            for start in starts {
                 std::hint::black_box(place.start(way, start));
             }
         }
@@ -181,7 +186,7 @@ fn time(place: &Place, repetitions: u32, progress: &dyn Progress) -> Result<Vec<
     }
     progress.begin("time", u64::from(repetitions + 1) * Spawn::ALL.len() as u64);
     let seconds = interleaved(&mut pieces, repetitions, progress)?;
-    let each = 1e9 / place.starts.len() as f64;
+    let each = 1e9 / starts.len() as f64;
     Ok(seconds.into_iter().map(|seconds| Some(seconds.times(each))).collect())
 }
 
@@ -191,15 +196,17 @@ mod tests {
     use crate::measure::report::subject::HardSet;
     use crate::progress::Silent;
 
+    const UNTIMED: Effort = Effort { rays_timed: 0, repetitions: 0 };
+
     #[test]
     fn flat_meshes_are_seen_from_outside_their_plane() {
-        let rows = measure(&Subject::hard(HardSet::Grid), 500, 0, &Silent).unwrap();
+        let rows = measure(&Subject::hard(HardSet::Grid), 500, UNTIMED, &Silent).unwrap();
         assert!(rows.iter().all(|row| row.self_hits.total > 100 && row.mean_clearance_ulp.is_finite()), "{rows:?}");
     }
 
     #[test]
     fn fixed_distances_fail_away_from_zero_and_the_error_bound_does_not() {
-        let rows = measure(&Subject::hard(HardSet::Sphere), 4000, 0, &Silent).unwrap();
+        let rows = measure(&Subject::hard(HardSet::Sphere), 4000, UNTIMED, &Silent).unwrap();
         let found = |place: &str, way: Spawn| {
             rows.iter().find(|row| row.place.starts_with(place) && row.name == way.name()).unwrap()
         };

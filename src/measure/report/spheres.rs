@@ -1,8 +1,10 @@
 //! Quadrics: nanoseconds a ray against the error of a unit sphere's hits, near by and far away.
 
 use glam::{DAffine3, DVec3, Vec3};
+use rayon::prelude::*;
 
 use super::accuracy::{Spread, angle, ulp};
+use super::query::Effort;
 use super::ray_set::Group;
 use super::rays::SEED;
 use crate::error::Result;
@@ -12,7 +14,7 @@ use crate::math::vector::{basis, dot, length, normalize};
 use crate::measure::oracle::Oracle;
 use crate::measure::speed::interleaved;
 use crate::measure::statistics::Median;
-use crate::measure::sweep::{Cost, Rate, dominated};
+use crate::measure::sweep::{Cost, Range, Rate, dominated};
 use crate::measure::variants::sphere::{Sphere, SphereTest};
 use crate::progress::Progress;
 use crate::scene::{Object, Scene, Shape};
@@ -47,26 +49,26 @@ pub struct SphereRow {
     pub dominated: bool,
 }
 
-/// Compares the formulas with `count` rays a distance.
+/// Compares the formulas with `count` rays a distance, of which the first ones are timed.
 ///
 /// # Errors
 /// A cancellation.
-pub fn measure(count: usize, repetitions: u32, progress: &dyn Progress) -> Result<Vec<SphereRow>> {
+pub fn measure(count: usize, effort: Effort, progress: &dyn Progress) -> Result<Vec<SphereRow>> {
     let mut rows = Vec::new();
     for group in Group::ALL {
         for distance in DISTANCES {
-            rows.extend(at(group, distance, count, repetitions, progress)?);
+            rows.extend(at(group, distance, count, effort, progress)?);
         }
     }
     Ok(rows)
 }
 
-fn at(group: Group, distance: f64, count: usize, repetitions: u32, progress: &dyn Progress) -> Result<Vec<SphereRow>> {
+fn at(group: Group, distance: f64, count: usize, effort: Effort, progress: &dyn Progress) -> Result<Vec<SphereRow>> {
     let center = (DVec3::new(0.48, 0.6, -0.64) * distance).as_vec3();
     let sphere = Sphere::new(center, 1.0);
     let rays = rays(group, center, count);
     let truths = truths(center, &rays, progress)?;
-    let times = time(&sphere, &rays, repetitions, progress)?;
+    let times = time(&sphere, &rays[..effort.rays_timed.min(rays.len())], effort.repetitions, progress)?;
     let mut rows: Vec<SphereRow> = Vec::new();
     for (test, ns_per_ray) in SphereTest::ALL.into_iter().zip(times) {
         let (mut misses, mut false_hits) = (0, 0);
@@ -99,7 +101,7 @@ fn at(group: Group, distance: f64, count: usize, repetitions: u32, progress: &dy
             dominated: false,
         });
     }
-    let cost = |row: &SphereRow| Cost::of_time(row.ns_per_ray, (row.misses.wrong + row.false_hits.wrong) as f64);
+    let cost = |row: &SphereRow| Cost::of_time(row.ns_per_ray, [&row.misses, &row.false_hits].map(Range::of_rate));
     let dominated = dominated(&rows.iter().map(cost).collect::<Vec<_>>());
     rows.iter_mut().zip(dominated).for_each(|(row, dominated)| row.dominated = dominated);
     Ok(rows)
@@ -133,7 +135,7 @@ fn truths(center: Vec3, rays: &[Ray], progress: &dyn Progress) -> Result<Vec<Opt
     let object = Object { name: "sphere".into(), shape: Shape::Quadric(0), transform, material: Some(0) };
     let scene = Scene { quadrics: vec![shapes::sphere()], objects: vec![object], ..Scene::default() };
     let oracle = Oracle::new(&scene)?;
-    rays.iter()
+    rays.par_iter()
         .map(|ray| {
             progress.check()?;
             Ok(oracle.closest(ray).map(|hit| hit.t.to_f64()))
@@ -143,7 +145,7 @@ fn truths(center: Vec3, rays: &[Ray], progress: &dyn Progress) -> Result<Vec<Opt
 
 /// Nanoseconds a ray.
 fn time(sphere: &Sphere, rays: &[Ray], repetitions: u32, progress: &dyn Progress) -> Result<Vec<Option<Median>>> {
-    if repetitions == 0 {
+    if repetitions == 0 || rays.is_empty() {
         return Ok(vec![None; SphereTest::ALL.len()]);
     }
     let mut work = SphereTest::ALL.map(|test| {
@@ -169,7 +171,7 @@ mod tests {
 
     #[test]
     fn the_textbook_fails_far_away_and_ours_does_not() {
-        let rows = measure(500, 0, &Silent).unwrap();
+        let rows = measure(500, Effort { rays_timed: 0, repetitions: 0 }, &Silent).unwrap();
         assert_eq!(rows.len(), 2 * 4 * 3);
         for row in rows.iter().filter(|row| row.default) {
             assert_eq!((row.misses.wrong, row.false_hits.wrong), (0, 0), "{row:?}");

@@ -55,6 +55,10 @@ pub trait BoxTest: Send + Sync {
     /// What it is called in reports.
     const NAME: &'static str;
 
+    /// Whether the boxes are those around what the renderer's triangle test may find
+    /// ([`hit_bounds`](crate::geometry::triangle::hit_bounds)), not those of the corners.
+    const ENLARGED: bool;
+
     /// A valid ray as the test wants it.
     type Ray: Copy;
 

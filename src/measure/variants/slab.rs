@@ -1,4 +1,4 @@
-//! Box tests: the textbook's, and the renderer's.
+//! Box tests: the textbook's, Ize's, and the renderer's.
 
 use glam::Vec3;
 
@@ -20,6 +20,7 @@ pub struct PlainRay {
 
 impl BoxTest for Plain {
     const NAME: &'static str = "plain";
+    const ENLARGED: bool = false;
     type Ray = PlainRay;
 
     fn ray(ray: &Ray) -> PlainRay {
@@ -40,11 +41,39 @@ impl BoxTest for Plain {
     }
 }
 
-/// Ize, "Robust BVH Ray Traversal", JCGT 2013, as the renderer does it: [`Bounds::interval`].
+/// Ize, "Robust BVH Ray Traversal", JCGT 2013: far planes are crossed with the inverse made 2 ulp larger, which covers
+/// what the box test itself rounds. What the triangle test rounds is not considered.
+pub struct Ize;
+
+impl BoxTest for Ize {
+    const NAME: &'static str = "padded (Ize 2013)";
+    const ENLARGED: bool = false;
+    type Ray = PreparedRay;
+
+    fn ray(ray: &Ray) -> PreparedRay {
+        let prepared = PreparedRay::new(ray).expect("the ray is valid");
+        let inverse_far = prepared.inverse.to_array().map(two_ulp_farther);
+        PreparedRay { inverse_far: inverse_far.into(), ..prepared }
+    }
+
+    #[inline(always)]
+    fn interval(ray: &PreparedRay, bounds: &Bounds, near: f32, far: f32) -> Interval {
+        bounds.interval(ray, near, far)
+    }
+}
+
+/// The value 2 ulp farther from zero; infinities stay.
+fn two_ulp_farther(x: f32) -> f32 {
+    if x > 0.0 { x.next_up().next_up() } else { x.next_down().next_down() }
+}
+
+/// The renderer's: Ize's with more ulp, for what the triangle test rounds as well ([`Bounds::interval`]), around
+/// triangles whose boxes are [enlarged](crate::geometry::triangle::hit_bounds).
 pub struct Padded;
 
 impl BoxTest for Padded {
-    const NAME: &'static str = "padded";
+    const NAME: &'static str = "padded (ours)";
+    const ENLARGED: bool = true;
     type Ray = PreparedRay;
 
     fn ray(ray: &Ray) -> PreparedRay {

@@ -4,10 +4,10 @@ use glam::{DVec3, Vec3};
 
 use super::baldwin_weber::BaldwinWeber;
 use super::moller_trumbore::{MollerTrumbore, MollerTrumboreF64};
-use super::slab::{Padded, Plain};
+use super::slab::{Ize, Padded, Plain};
 use super::sphere::{Sphere, SphereTest};
 use super::tree::{Skeleton, VariantTree};
-use super::woop::{Kahan, Published, Wide, Woop, WoopClamped};
+use super::woop::{Kahan, Narrow, Published, Wide, Woop, WoopClamped};
 use super::{BoxTest, TriangleTest};
 use crate::accel::Params;
 use crate::geometry::{Bounds, Ray, TriangleMesh};
@@ -21,11 +21,20 @@ fn intersect<T: TriangleTest>(ray: &Ray, corners: [Vec3; 3]) -> Option<[f32; 3]>
 }
 
 /// The answers of all triangle tests, with their names.
-fn all_answers(ray: &Ray, corners: [Vec3; 3]) -> [(&'static str, Option<[f32; 3]>); 7] {
+fn all_answers(ray: &Ray, corners: [Vec3; 3]) -> [(&'static str, Option<[f32; 3]>); 8] {
     macro_rules! answers {
         ($($test:ty),+) => { [$((<$test>::NAME, intersect::<$test>(ray, corners))),+] };
     }
-    answers!(MollerTrumbore, BaldwinWeber, WoopClamped, Woop<Published>, Woop<Wide>, Woop<Kahan>, MollerTrumboreF64)
+    answers!(
+        MollerTrumbore,
+        BaldwinWeber,
+        WoopClamped,
+        Woop<Published>,
+        Woop<Narrow>,
+        Woop<Wide>,
+        Woop<Kahan>,
+        MollerTrumboreF64
+    )
 }
 
 fn near(random: &mut Random, scale: f64) -> Vec3 {
@@ -97,6 +106,7 @@ fn rays_at_the_vertices_of_a_closed_sphere_pass_through_the_tests_that_are_not_w
     assert!(leaky[0] > 1000 && leaky[1] > 1000 && leaky[2] > 0 && leaky[2] < 200, "{leaky:?}");
     assert_eq!(misses::<WoopClamped, Padded>(&mesh, &rays), 0);
     assert_eq!(misses::<Woop<Published>, Padded>(&mesh, &rays), 0);
+    assert_eq!(misses::<Woop<Narrow>, Padded>(&mesh, &rays), 0);
     assert_eq!(misses::<Woop<Wide>, Padded>(&mesh, &rays), 0);
     assert_eq!(misses::<Woop<Kahan>, Padded>(&mesh, &rays), 0);
 }
@@ -128,10 +138,11 @@ fn trees_find_what_every_triangle_asked_one_by_one_gives() {
     check::<MollerTrumbore, Plain>(&mesh, &rays);
     check::<WoopClamped, Padded>(&mesh, &rays);
     check::<MollerTrumboreF64, Padded>(&mesh, &rays);
+    check::<WoopClamped, Ize>(&mesh, &rays);
 }
 
 #[test]
-fn the_plain_box_test_loses_rays_at_the_edges_of_boxes_and_the_padded_one_does_not() {
+fn the_plain_box_test_loses_rays_at_the_edges_of_boxes_and_the_padded_ones_do_not() {
     fn lost<B: BoxTest>() -> usize {
         let mut random = Random::new(21, 0);
         // Differences of multiples of 2^-10 are exact: the ray passes exactly through the place aimed at.
@@ -150,7 +161,26 @@ fn the_plain_box_test_loses_rays_at_the_edges_of_boxes_and_the_padded_one_does_n
         lost
     }
     assert!(lost::<Plain>() > 20_000 / 100, "{}", lost::<Plain>());
-    assert_eq!(lost::<Padded>(), 0);
+    assert_eq!((lost::<Ize>(), lost::<Padded>()), (0, 0));
+}
+
+#[test]
+fn the_published_padding_is_two_ulp() {
+    let far = Ize::ray(&Ray::new(Vec3::ZERO, Vec3::new(1.0, -2.0, 0.0))).inverse_far;
+    assert_eq!(far, Vec3::new(1.0 + 2.0 * f32::EPSILON, -0.5 - f32::EPSILON, f32::INFINITY));
+}
+
+#[test]
+fn f32_edges_alone_lose_slivers_that_f64_finds() {
+    // The edge functions around the ray are -1, -1 and -2 times 2^-46, next to products of 1.
+    const E: f32 = f32::EPSILON;
+    let corners = [[1.0, 1.0 + E], [1.0 + 2.0 * E, 1.0 + 3.0 * E], [-1.0 - E, -1.0 - 2.0 * E]];
+    let corners = corners.map(|[x, y]| Vec3::new(x, y, 4.0));
+    let ray = Ray::new(Vec3::ZERO, Vec3::Z);
+    assert_eq!(intersect::<Woop<Narrow>>(&ray, corners), None);
+    for found in [intersect::<WoopClamped>(&ray, corners), intersect::<Woop<Published>>(&ray, corners)] {
+        assert_eq!(found, Some([4.0, 0.25, 0.5]));
+    }
 }
 
 #[test]

@@ -19,7 +19,10 @@ const MAX_LEAF: u32 = 4;
 
 /// A topology over a mesh's live triangles, shared by all combinations.
 pub struct Skeleton {
-    nodes: Vec<Node>,
+    /// With boxes around all that the renderer's triangle test may find.
+    enlarged: Vec<Node>,
+    /// The same with boxes around the corners.
+    tight: Vec<Node>,
     corners: Vec<[Vec3; 3]>,
     primitives: Vec<u32>,
 }
@@ -35,14 +38,37 @@ impl Skeleton {
         let boxes: Vec<Bounds> = live.iter().map(|&number| hit_bounds(mesh.triangle(number))).collect();
         let topology = Topology::build(&boxes, params.preset, MAX_LEAF, &mut share)?;
         let primitives: Vec<u32> = topology.order.iter().map(|&at| live[at as usize]).collect();
-        let corners = primitives.iter().map(|&number| mesh.triangle(number)).collect();
-        Ok(Self { nodes: topology.nodes, corners, primitives })
+        let corners: Vec<[Vec3; 3]> = primitives.iter().map(|&number| mesh.triangle(number)).collect();
+        let tight = with_tight_boxes(&topology.nodes, &corners);
+        Ok(Self { enlarged: topology.nodes, tight, corners, primitives })
+    }
+
+    /// The nodes with the boxes that a box test wants.
+    fn nodes<B: BoxTest>(&self) -> &[Node] {
+        if B::ENLARGED { &self.enlarged } else { &self.tight }
     }
 
     /// The box around everything.
     pub fn bounds(&self) -> Bounds {
-        self.nodes.first().map_or(Bounds::EMPTY, |root| root.bounds)
+        self.enlarged.first().map_or(Bounds::EMPTY, |root| root.bounds)
     }
+}
+
+/// The nodes with boxes around the corners of what is below them, which are in the order of the leaves.
+fn with_tight_boxes(nodes: &[Node], corners: &[[Vec3; 3]]) -> Vec<Node> {
+    let mut nodes = nodes.to_vec();
+    // Children come after their parent.
+    for number in (0..nodes.len()).rev() {
+        let Node { first, count, .. } = nodes[number];
+        let (first, count) = (first as usize, count as usize);
+        nodes[number].bounds = if count > 0 {
+            let inside = corners[first..first + count].iter().map(|&corners| Bounds::of(corners));
+            inside.fold(Bounds::EMPTY, |all, own| all.union(own))
+        } else {
+            nodes[first].bounds.union(nodes[first + 1].bounds)
+        };
+    }
+    nodes
 }
 
 /// The tree with one combination of tests.
@@ -68,7 +94,7 @@ impl<'a, T: TriangleTest, B: BoxTest> VariantTree<'a, T, B> {
 
     /// Bytes of nodes, triangles and their numbers.
     pub fn bytes(&self) -> usize {
-        size_of_val(self.skeleton.nodes.as_slice())
+        size_of_val(self.skeleton.nodes::<B>())
             + size_of_val(self.triangles.as_slice())
             + size_of_val(self.skeleton.primitives.as_slice())
     }
@@ -98,7 +124,7 @@ impl<'a, T: TriangleTest, B: BoxTest> VariantTree<'a, T, B> {
     /// Calls `found` for every hit in leaves that the ray crosses; it returns the new end of the ray, or stops.
     #[inline(always)]
     fn traverse(&self, ray: &Ray, mut found: impl FnMut(u32, TriangleHit) -> Option<f32>) {
-        let nodes = &self.skeleton.nodes;
+        let nodes = self.skeleton.nodes::<B>();
         if !ray.is_valid() || nodes.is_empty() {
             return;
         }
