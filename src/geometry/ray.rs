@@ -7,7 +7,8 @@ use glam::Vec3;
 ///
 /// The direction need not have unit length; t is in its units. A negative `t_min` counts as 0: a ray starts at its
 /// origin. A ray with a NaN anywhere, an infinite origin or direction, a zero direction, or `t_min > t_max` meets
-/// nothing. A direction shorter than 2^-126, of which f32 has no reciprocal, may miss what lies in its way. The layout is that of ray files: eight little-endian f32.
+/// nothing. A ray with a component of its direction that is not 0 and smaller than 2^-126, of which f32 has no reciprocal,
+/// may miss what lies in its way. The layout is that of ray files: eight little-endian f32.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Ray {

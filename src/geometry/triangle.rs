@@ -79,7 +79,8 @@ pub fn intersect_triangle(ray: &PreparedRay, a: Vec3, b: Vec3, c: Vec3) -> Optio
     if !(t >= ray.t_min && t <= ray.t_max && t < f32::INFINITY) {
         return None;
     }
-    Some(TriangleHit { t, u: (weight_b / determinant) as f32, v: (weight_c / determinant) as f32 })
+    let share = |weight: f64| (weight / determinant) as f32 + 0.0;
+    Some(TriangleHit { t, u: share(weight_b), v: share(weight_c) })
 }
 
 /// The box in which the test looks for hits on a triangle: its own, made larger along axes along which it is not flat by
