@@ -4,49 +4,53 @@
 //!
 //! # The edge bound of triangles
 //!
-//! With `R = p - o` for a vertex p, and s = d_x / d_z the shear, Woop's test computes `x = R_x - s R_z`. R_x and R_z carry one
-//! rounding each, s one, the product one, the difference one: `|x^ - x| <= gamma_4 (|R_x| + |s R_z|)`, the same for y, and
-//! 2^-149 (1 + |R_z|) where s or the product underflows. So the test sees a triangle T^ whose sheared corners are moved
-//! by at most h, the largest of the lengths of (error of x, error of y). Since |s| <= 1, h < 12 u max|p - o|.
+//! With `R = p - o` for a vertex p, and s = d_x / d_z the shear, Woop's test computes `x = R_x - s R_z` in f32. One rounding is in
+//! R_x, three are in s R_z (R_z, s, the product), and one more is of the difference: with
+//! `e = u |R_x| + gamma_3 |s R_z| + 2^-150 (1 + |R_z|)`, the last for underflow of s and of the product,
+//! `|x^ - x| <= e + u (|x| + e)`, and the same for y. So the test sees a triangle T^ whose sheared corners are moved
+//! by at most h, the largest of the lengths of (error of x, error of y). That is `2 u |R_x| + 4 u |s R_z|` at most, so that
+//! `h <= 2 u |(R_x, R_y)| + 4 sqrt(2) u |R_z| <= 6 u max|p - o|`, but for what is below 1e-6 of it, and underflow.
+//!
+//! From there on the test errs no more: products of f32 are rounded monotonely where they reject, and exact in f64 where
+//! they decide; a rounded difference keeps its sign. Three weights of one sign, not all 0, mean that T^ has an area and the
+//! line in it. Hence *it reports a hit only of a line that passes T^, and a miss only of one that does not, or where T^ has
+//! no area*. That f32 could lose the line's part of the triangle's box to rounding is not excused here.
 //!
 //! *If the ray's line passes T and not T^, or T^ and not T, it passes within h of an edge of T, as a segment.* Move the corners
 //! from T to T^ evenly. The line is inside at one end and outside at the other, so at some time it lies on an edge, at
-//! `(1 - l) a' + l b'` with l in [0, 1] and corners moved by at most h; the same l on T's own edge is within h.
+//! `(1 - l) a' + l b'` with l in [0, 1] and corners moved by at most h; the same l on T's own edge is within h. A triangle
+//! without area, T seen edge-on or T^, is nothing but edges.
 //! Distances in the sheared plane are taken at a fixed z and so are no smaller than those from the line in space.
-//!
-//! The signs that the test takes are those of `fl(a_x b_y) - fl(a_y b_x)`. Rounding is monotone, so a product that is larger stays
-//! no smaller: a sign is right or becomes 0, and zeros are inside. Hence *no miss comes from this*, and an extra hit
-//! needs an edge with `|a x b| <= 1.01 u |a| |b|`: one seen from the ray at an angle of nearly 0 or pi. At pi the ray passes
-//! between its ends, within `|a x b| / |a - b| <= 1.01 u min(|a|, |b|)`. At 0 the ray passes the edge's line beyond
-//! its end; it is then outside of another edge as well, unless that is seen at an angle of nearly 0 or pi too; both at 0, all
-//! of T^ is seen within 2 u: [`TriangleBounds::needle`], for which the box that t is clamped to is the only bound. No such hit
-//! has been seen, and it would be counted as wrong.
 //!
 //! # The bound of t of triangles
 //!
-//! With weights w_i (twice the areas of sheared triangles) and t_i = R_z / d_z of the corners, t = sum w_i t_i / sum w_i. Since
-//! sum w_i (t_i - t) = 0,
+//! With weights w_i (twice the areas of sheared triangles) and t_i = R_z / d_z of the corners, the line meets the plane at
+//! t = sum w_i t_i / sum w_i, inside the triangle or not. Let w^_i be the weights of T^. Since sum w_i (t_i - t) = 0,
 //!
 //! ```text
 //! sum w^_i t_i / sum w^_i - t = sum (w^_i - w_i) (t_i - t) / sum w^_i
 //! ```
 //!
-//! exactly. A weight is off by at most `D = e_ax |b_y| + e_ay |b_x| + e_bx |a_y| + e_by |a_x| + 2 e e + gamma_2 (|a_x b_y| + |a_y
-//! b_x|) + 2^-148`. So the first bound is `sum D_i |t_i - t| / (|sum w_i| - sum D_i)`. It grows without end as a triangle is
-//! seen edge-on; but computed weights have one sign, so that their mean of the t_i cannot leave these: the second bound
-//! is `max |t_i - t|`. The smaller holds. What remains is relative: t^_i carry 3 roundings (d_z's reciprocal, R_z, the
-//! product), products and sums 3, the determinant 2, the quotient 1: gamma_9 max|t_i|. Clamping into an interval whose ends
-//! are computed moves t towards the true value or to an end that is off by at most gamma_7 of itself (a difference, a
-//! reciprocal 2 ulp larger, a product): less than that. Underflow of weights times t adds 6 2^-149 / |sum w_i|.
+//! exactly. A weight is off by at most `D = e_ax |b_y| + e_ay |b_x| + e_bx |a_y| + e_by |a_x| + e_ax e_by + e_ay e_bx`, so that the mean
+//! lies within `sum D_i |t_i - t| / (|sum w_i| - sum D_i)` of t. That grows without end as a triangle is seen edge-on; but w^_i
+//! have one sign, and their mean lies between the least and the largest t_i. Both hold. What remains is relative: R_z carries
+//! one rounding, which weights of one sign pass on as u |t|, or u max|t_i| where the t_i differ in sign; f64 adds 9
+//! of its own roundings, less than 2^-49; t is rounded to f32 once: u |t| + 2^-150.
 //!
-//! All of it for directions whose largest component lies between 2^-126 and 2^126; beyond, no bound is claimed.
+//! Then t is clamped into the interval of the triangle's [`hit_bounds`]. Its near end carries 3 roundings (a difference, a
+//! reciprocal, a product): gamma_3. The far end's reciprocal is made [`PADDING`] ulp larger, n of which are n u to 2 n u: it is
+//! off by at most gamma_(3 + 2 n), away from 0. Clamping is monotone in t and in both ends, so that bounds of these give bounds of the result.
+//!
+//! All of it for directions whose components are 0 or lie between 2^-126 and 2^126, in the world and in the instance's
+//! space; beyond, no bound is claimed.
 //!
 //! # Instances
 //!
 //! The local ray `M^-1 o, M^-1 d` is rounded to f32: by u of each component, and by what f64 lost before. For that let B be the
 //! computed inverse and r = |B A - I| + 8 eps |B| |A| (norms of largest row sums): `|(M^-1 - B) v| <= r |B| |v|`. These errors
 //! add to those of x, y and t_i as they stand in the formulas. A distance in local space is one in the world times at
-//! most the Frobenius norm of A.
+//! most the Frobenius norm of A. Which component is the largest is asked of the rounded direction, as the renderer does. In
+//! the end t is clamped into the interval of the instance's box in the world.
 //!
 //! # Quadrics
 //!
@@ -54,17 +58,23 @@
 //! of f64 the quadratic is that of a surface F + f with |f| <= Phi = 2^-39 sum |q_ij| m_i m_j, m = |p| + |centre|, plus |grad F|
 //! 2^-47 (|o| + |t d| + |centre|) for where the point is. A root moves to where |F| <= Phi: by
 //! `2 Phi / (|F'| + sqrt(F'^2 - 4 |a| Phi))` if that is real, else (a tangent) it may be gone, or be `(|F'| + sqrt(F'^2 + 4
-//! |a| Phi)) / (2 |a|)` off. Rounding t to f32 adds u |t|, clamping gamma_7 |t|. On a cap t is a quotient of f64.
+//! |a| Phi)) / (2 |a|)` off. Rounding t to f32 adds u |t| + 2^-150, and it is clamped into the interval of the instance's box,
+//! as above. On a cap t is a quotient of f64.
 
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 
-use crate::geometry::{Quadric, Ray};
+use crate::geometry::ray::{Interval, PADDING, PreparedRay};
+use crate::geometry::triangle::hit_bounds;
+use crate::geometry::{Bounds, Quadric, Ray};
 use crate::math::float::{UNIT_ROUNDOFF, gamma};
 use crate::math::vector::{dot, length};
 use crate::render::world::Instance;
 
-/// What f32 loses where numbers underflow.
-const UNDERFLOW: f64 = 1.401_298_464_324_817e-45;
+/// What f32 loses at most where a result underflows: half of the least number, 2^-150.
+const UNDERFLOW: f64 = 7.006_492_321_624_085e-46;
+
+/// What evaluating these bounds in f64 may lose of them: some ten roundings of terms that are 2^29 times smaller.
+const OWN_ROUNDING: f64 = 1.0 + 1e-7;
 
 /// A ray in the space of an instance, and what rounding it there may have done.
 struct LocalRay {
@@ -115,103 +125,222 @@ fn inverse_error(to_world: &DAffine3, to_object: &DAffine3) -> f64 {
     (residual + 8.0 * f64::EPSILON) * norm(b)
 }
 
+/// Numbers of which only the ends are known.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Span {
+    /// The least.
+    pub least: f64,
+    /// The largest.
+    pub largest: f64,
+}
+
+impl Span {
+    /// No bound.
+    pub const ALL: Self = Self { least: f64::NEG_INFINITY, largest: f64::INFINITY };
+
+    fn around(t: f64, error: f64) -> Self {
+        Self { least: t - error, largest: t + error }
+    }
+
+    /// The numbers in both.
+    fn and(self, other: Self) -> Self {
+        Self { least: self.least.max(other.least), largest: self.largest.min(other.largest) }
+    }
+
+    fn magnitude(self) -> f64 {
+        self.least.abs().max(self.largest.abs())
+    }
+
+    /// After each was rounded to f32.
+    fn rounded(self) -> Self {
+        let Self { least, largest } = self;
+        let error = |t: f64| UNIT_ROUNDOFF * t.abs() * OWN_ROUNDING + UNDERFLOW;
+        Self { least: least - error(least), largest: largest + error(largest) }
+    }
+
+    /// After each was clamped into an interval whose ends are known so well; it is not empty, or there is no hit.
+    fn clamped(self, near: Self, far: Self) -> Self {
+        Self {
+            least: self.least.max(near.least).min(far.least).max(near.least),
+            largest: self.largest.max(near.largest).min(far.largest),
+        }
+    }
+}
+
+/// Where the renderer takes a line to enter a box, and to leave it.
+fn box_interval(bounds: &Bounds, line: &LocalRay) -> (Span, Span) {
+    /// Roundings of the far end, an ulp of the padding being two at most.
+    const FAR: u32 = 3 + 2 * PADDING;
+    let (min, max) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
+    let none = Span { least: f64::NEG_INFINITY, largest: f64::NEG_INFINITY };
+    let (mut near, mut far) = (none, Span { least: f64::INFINITY, largest: f64::INFINITY });
+    for axis in 0..3 {
+        let (d, lost) = (line.direction[axis], line.direction_error[axis]);
+        if d == 0.0 && lost == 0.0 {
+            continue;
+        }
+        let (mut entry, mut exit) = (Span::ALL, Span::ALL);
+        if d.abs() > lost {
+            let (first, last) = if d < 0.0 { (max[axis], min[axis]) } else { (min[axis], max[axis]) };
+            let crossing = |at: f64| {
+                let t = (at - line.origin[axis]) / d;
+                Span::around(t, (line.origin_error[axis] + t.abs() * lost) / (d.abs() - lost) * OWN_ROUNDING)
+            };
+            let rounding = |t: f64, count: u32| gamma(count) * t.abs() * OWN_ROUNDING + UNDERFLOW;
+            let (a, b) = (crossing(first), crossing(last));
+            entry = Span { least: a.least - rounding(a.least, 3), largest: a.largest + rounding(a.largest, 3) };
+            // Away from 0 by more than roundings lead back to it.
+            exit = Span {
+                least: b.least - if b.least < 0.0 { rounding(b.least, FAR) } else { UNDERFLOW },
+                largest: b.largest + if b.largest > 0.0 { rounding(b.largest, FAR) } else { UNDERFLOW },
+            };
+        }
+        near = Span { least: near.least.max(entry.least), largest: near.largest.max(entry.largest) };
+        far = Span { least: far.least.min(exit.least), largest: far.largest.min(exit.largest) };
+    }
+    (near, far)
+}
+
+/// What becomes of t in the interval of the instance's box.
+fn clipped(t: Span, ray: &Ray, instance: &Instance) -> Span {
+    let Some(bounds) = instance.bounds else { return t };
+    let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
+    let zero = DVec3::ZERO;
+    let line = LocalRay { origin, direction, origin_error: zero, direction_error: zero, stretch: 1.0 };
+    let (near, far) = box_interval(&bounds, &line);
+    t.clamped(near, far)
+}
+
+/// Whether bounds are claimed for a direction.
+fn is_usual(direction: Vec3) -> bool {
+    let usual = libm::ldexpf(1.0, -126)..=libm::ldexpf(1.0, 126);
+    direction.to_array().into_iter().all(|component| component == 0.0 || usual.contains(&component.abs()))
+}
+
 /// Bounds for one ray and one triangle.
 #[derive(Debug, Clone, Copy)]
 pub struct TriangleBounds {
     /// World distance of the ray's line from an edge within which hit and miss may be confused.
     pub edge: f64,
-    /// Whether the triangle is seen so nearly edge-on that an extra hit is bounded by its box alone.
-    pub needle: bool,
-    /// Largest error of t; infinite where none is claimed. NaN if t was not given.
-    pub t: f64,
+    /// Whether the triangle is seen so nearly edge-on that rounding can turn it around.
+    pub edge_on: bool,
+    /// Where t lies if the renderer reports a hit.
+    pub t: Span,
 }
 
-/// The bounds for a ray and a triangle of an instance, whose exact t is given if there is one.
+impl TriangleBounds {
+    /// Nothing is claimed.
+    const NONE: Self = Self { edge: f64::INFINITY, edge_on: true, t: Span::ALL };
+}
+
+/// The bounds for a ray and a triangle of an instance, whose exact t is given if the line passes it.
 pub fn triangle(ray: &Ray, instance: &Instance, corners: [Vec3; 3], t: Option<f64>) -> TriangleBounds {
-    let LocalRay { origin, direction: d, origin_error, direction_error, stretch } = local(ray, instance);
-    let magnitude = d.abs();
-    let z = if magnitude.x > magnitude.y && magnitude.x > magnitude.z {
-        0
-    } else if magnitude.y > magnitude.z {
-        1
-    } else {
-        2
+    let rounded = PreparedRay::new(ray).and_then(|ray| instance.local_ray(&ray, Interval::ALL));
+    let Some(rounded) = rounded.filter(|local| is_usual(ray.direction) && is_usual(local.direction)) else {
+        return TriangleBounds::NONE;
     };
-    let (kx, ky) = ((z + 1) % 3, (z + 2) % 3);
-    let along = magnitude[z] - direction_error[z];
-    let usual = libm::ldexp(1.0, -126)..=libm::ldexp(1.0, 126);
-    if !usual.contains(&along) {
-        return TriangleBounds { edge: f64::INFINITY, needle: true, t: f64::INFINITY };
+    let line = local(ray, instance);
+    let LocalRay { origin, direction: d, origin_error, direction_error, stretch } = line;
+    let [kx, ky, z] = rounded.axes;
+    let along = d[z].abs() - direction_error[z];
+    if !(along > 0.0) {
+        return TriangleBounds::NONE;
     }
 
     // The sheared corners, and how far the renderer's may be from them.
     let relative = corners.map(|p| p.as_dvec3() - origin);
     let sheared = |r: DVec3, k: usize| {
         let s = d[k] / d[z];
+        let x = r[k] - s * r[z];
+        let own = UNIT_ROUNDOFF * r[k].abs() + gamma(3) * (s * r[z]).abs() + UNDERFLOW * (1.0 + r[z].abs());
+        let own = own + UNIT_ROUNDOFF * (x.abs() + own);
         let shear_error = (direction_error[k] + s.abs() * direction_error[z]) / along;
-        let own = gamma(4) * (r[k].abs() + (s * r[z]).abs()) + UNDERFLOW * (1.0 + r[z].abs());
-        let inherited = origin_error[k] + s.abs() * origin_error[z] + shear_error * r[z].abs();
-        (r[k] - s * r[z], own + inherited)
+        let inherited = origin_error[k] + s.abs() * origin_error[z] + shear_error * (r[z].abs() + origin_error[z]);
+        (x, (own + inherited * (1.0 + gamma(8))) * OWN_ROUNDING)
     };
     let points = relative.map(|r| [sheared(r, kx), sheared(r, ky)]);
-    let radius = |[(x, _), (y, _)]: [(f64, f64); 2]| (x * x + y * y).sqrt();
     let shift = points.map(|[(_, ex), (_, ey)]| (ex * ex + ey * ey).sqrt()).into_iter().fold(0.0, f64::max);
-    let far = points.map(radius).into_iter().fold(0.0, f64::max);
-    let edge = stretch * (shift + 1.01 * UNIT_ROUNDOFF * (far + shift)) * (1.0 + 1e-9);
 
     // The weights, and how far the renderer's may be from them.
     let weight = |a: [(f64, f64); 2], b: [(f64, f64); 2]| {
         let [(ax, eax), (ay, eay)] = a;
         let [(bx, ebx), (by, eby)] = b;
-        let products = (ax * by).abs() + (ay * bx).abs();
         let moved = eax * by.abs() + eay * bx.abs() + ebx * ay.abs() + eby * ax.abs() + eax * eby + eay * ebx;
-        (ax * by - ay * bx, (moved + gamma(2) * (products + moved) + 2.0 * UNDERFLOW) * (1.0 + 1e-6))
+        (ax * by - ay * bx, moved * OWN_ROUNDING)
     };
     let [a, b, c] = points;
     let weights = [weight(b, c), weight(c, a), weight(a, b)];
     let error_sum: f64 = weights.iter().map(|(_, error)| error).sum();
-    let determinant = (weights[0].0 + weights[1].0 + weights[2].0).abs();
-    let needle = determinant <= error_sum;
+    let sum: f64 = weights.iter().map(|(weight, _)| weight).sum();
+    let edge_on = sum.abs() <= error_sum;
 
-    let t_bound = t.map_or(f64::NAN, |t| {
-        let times = relative.map(|r| r[z] / d[z]);
-        let by_weights: f64 = times.iter().zip(&weights).map(|(ti, (_, error))| error * (ti - t).abs()).sum();
-        let least = determinant - error_sum;
-        let by_weights = if least > 0.0 { (by_weights + 6.0 * UNDERFLOW) / least } else { f64::INFINITY };
-        let by_hull = times.map(|ti| (ti - t).abs()).into_iter().fold(0.0, f64::max);
-        let largest = times.map(f64::abs).into_iter().fold(t.abs(), f64::max);
-        let inherited = (origin_error[z] + largest * direction_error[z]) / along;
-        (by_weights.min(by_hull) + inherited) * (1.0 + gamma(9)) + gamma(9) * largest + UNDERFLOW
-    });
-    TriangleBounds { edge, needle, t: t_bound }
+    // The mean of the corners' t, by what weights are off and by their having one sign.
+    let times = relative.map(|r| r[z] / d[z]);
+    let hull = Span {
+        least: times.into_iter().fold(f64::INFINITY, f64::min),
+        largest: times.into_iter().fold(f64::NEG_INFINITY, f64::max),
+    };
+    let mut mean = hull;
+    if !edge_on {
+        let t = t.unwrap_or_else(|| times.iter().zip(&weights).map(|(ti, (w, _))| ti * w).sum::<f64>() / sum);
+        let moved: f64 = times.iter().zip(&weights).map(|(ti, (_, error))| error * (ti - t).abs()).sum();
+        let near = Span::around(t, moved / (sum.abs() - error_sum) * OWN_ROUNDING);
+        let both = hull.and(near);
+        // A line that is far from the triangle has no common part.
+        mean = if both.least <= both.largest { both } else { hull };
+    }
+    let one_sign = hull.least >= 0.0 || hull.largest <= 0.0;
+    let scale = if one_sign { mean.magnitude() } else { hull.magnitude() };
+    let relative_error = UNIT_ROUNDOFF + libm::ldexp(1.0, -49);
+    let inherited = (origin_error[z] + scale * direction_error[z]) / along;
+    let lost = (relative_error * scale + inherited * (1.0 + gamma(2))) * OWN_ROUNDING;
+    let mean = Span { least: mean.least - lost, largest: mean.largest + lost }.rounded();
+
+    let (near, far) = box_interval(&hit_bounds(corners), &line);
+    let own = mean.clamped(near, far);
+    let t = if instance.identity { own } else { clipped(own, ray, instance) };
+    TriangleBounds { edge: stretch * shift * OWN_ROUNDING, edge_on, t }
 }
 
-/// Bounds for one ray and one quadric.
+/// Bounds for one ray and one surface of a quadric.
 #[derive(Debug, Clone, Copy)]
 pub struct QuadricBounds {
-    /// Whether rounding can make or lose a crossing: a tangent, or a root beside a side of the clip box.
+    /// Whether rounding can make or lose this crossing: a tangent, or a root beside a side of the clip box.
     pub near_edge: bool,
-    /// Largest error of t at the t that was given.
-    pub t: f64,
+    /// Where t lies if the renderer reports a hit.
+    pub t: Span,
 }
 
-/// The bounds for a ray and a quadric of an instance, at t on surface `surface`.
-pub fn quadric(ray: &Ray, instance: &Instance, quadric: &Quadric, t: f64, surface: u32) -> QuadricBounds {
+/// The bounds for a ray and a quadric of an instance on surface `surface`: at its exact t if the line crosses it there, or
+/// else for the crossing nearest to `near` that rounding could make.
+pub fn quadric(
+    ray: &Ray,
+    instance: &Instance,
+    quadric: &Quadric,
+    surface: u32,
+    t: Option<f64>,
+    near: f64,
+) -> QuadricBounds {
+    if !is_usual(ray.direction) {
+        return QuadricBounds { near_edge: true, t: Span::ALL };
+    }
     let line = QuadricLine::new(ray, instance, quadric);
-    let sides = line.sides();
-    let is_near = |a: &(f64, f64), b: &(f64, f64)| (a.0 - b.0).abs() <= a.1 + b.1;
-    let roots = line.roots();
-    let beside_side = roots.iter().any(|root| sides.iter().any(|(side, _)| is_near(root, side)));
-    let at_corner = (0..sides.len()).any(|i| (0..i).any(|j| is_near(&sides[i].0, &sides[j].0)));
-    let own = if surface >= 2 {
-        let at = sides.iter().find(|(_, number)| *number == surface);
-        at.map_or(f64::INFINITY, |((_, error), _)| *error)
+    let (roots, sides) = (line.roots(), line.sides());
+    let own: Option<(f64, f64)> = if surface >= 2 {
+        sides.iter().find(|(_, number)| *number == surface).map(|(side, _)| *side)
     } else {
-        line.root_error(t)
+        let by_distance = |a: &&(f64, f64), b: &&(f64, f64)| (a.0 - near).abs().total_cmp(&(b.0 - near).abs());
+        t.map(|t| (t, line.root_error(t))).or_else(|| roots.iter().min_by(by_distance).copied())
     };
-    let rounded = own + (UNIT_ROUNDOFF + gamma(7)) * t.abs() + UNDERFLOW;
-    let near_edge = line.is_near_tangent() || line.is_in_side(t) || beside_side || at_corner;
-    QuadricBounds { near_edge, t: rounded }
+    // A cap that the line runs along, or a surface that it is nowhere near.
+    let Some(own) = own else { return QuadricBounds { near_edge: t.is_some(), t: Span::ALL } };
+    let is_near = |other: &(f64, f64)| (own.0 - other.0).abs() <= own.1 + other.1;
+    let beside = sides.iter().any(|(side, number)| *number != surface && is_near(side));
+    let rim = surface >= 2 && roots.iter().any(is_near);
+    let tangent = surface < 2 && line.is_near_tangent();
+    let near_edge = tangent || line.is_in_side(own.0) || beside || rim;
+    let computed = Span::around(t.unwrap_or(own.0), own.1).rounded();
+    QuadricBounds { near_edge, t: clipped(computed, ray, instance) }
 }
 
 /// A quadric's form along a line, in f64.

@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::Class;
-use super::bounds::{self, TriangleBounds};
+use super::bounds::{self, Span, TriangleBounds};
 use super::neighbours::Neighbours;
 use crate::error::Result;
 use crate::geometry::{Hit, Ray};
@@ -26,8 +26,8 @@ pub struct Judge<'a> {
 pub struct Verdict {
     /// How it compares.
     pub class: Class,
-    /// |t - exact t| over its bound, for the surface that the renderer reports; 0 where it reports none, or one that the
-    /// ray's line does not meet exactly.
+    /// |t - exact t| over its bound, for the surface that the renderer reports, or how far t is from the middle of where it
+    /// may lie, where the ray's line passes that surface by; 0 where it reports none.
     pub t_error: f64,
     /// The exact answer, rounded.
     pub exact: Hit,
@@ -41,10 +41,26 @@ struct Surface {
     near_edge: bool,
     /// The exact t where the line meets it.
     t: Option<f64>,
-    /// The bound of t.
-    bound: f64,
+    /// Where t lies if the renderer reports it.
+    span: Span,
     /// The edge bound, for triangles.
     edge: f64,
+}
+
+impl Surface {
+    fn is_at(&self, hit: &Hit) -> bool {
+        (self.instance, self.primitive) == (hit.instance, hit.primitive)
+    }
+
+    /// How far a reported t is off, in bounds.
+    fn error(&self, t: f64) -> f64 {
+        let Span { least, largest } = self.span;
+        let expected = self.t.unwrap_or(0.5 * (least + largest));
+        if t == expected || !(least.is_finite() && largest.is_finite()) {
+            return 0.0;
+        }
+        if t > expected { (t - expected) / (largest - expected) } else { (expected - t) / (expected - least) }
+    }
 }
 
 impl<'a> Judge<'a> {
@@ -62,42 +78,44 @@ impl<'a> Judge<'a> {
     }
 
     /// Compares the renderer's closest hit with the exact one.
+    ///
+    /// The surface that is reported must be one that rounding can make the ray hit, at a t that rounding can give it; and
+    /// each surface that the ray hits before that must be one that rounding can lose.
     pub fn judge(&self, ray: &Ray, hit: &Hit) -> Verdict {
         let exact = self.oracle.closest(ray);
         let rounded = exact.as_ref().map_or(Hit::MISS, ExactHit::hit);
         let found = hit.is_hit().then(|| self.surface(ray, hit.instance, hit.primitive, f64::from(hit.t)));
-        let t_error = found.as_ref().and_then(|surface| Some((f64::from(hit.t) - surface.t?).abs() / surface.bound));
-        let class = match (&exact, &found) {
-            (None, None) => Class::Same,
-            (Some(exact), None) => self.missing(ray, &self.surface_of(ray, exact)),
-            (None, Some(found)) => extra(ray, found),
-            (Some(exact), Some(found)) if (exact.instance, exact.primitive) == (found.instance, found.primitive) => {
-                Class::Same
-            }
-            (Some(exact), Some(found)) => self.other(ray, hit, found, &self.surface_of(ray, exact)),
-        };
-        Verdict { class, t_error: t_error.unwrap_or(0.0), exact: rounded }
+        let t_error = found.as_ref().map_or(0.0, |surface| surface.error(f64::from(hit.t)));
+        let same = (rounded.instance, rounded.primitive) == (hit.instance, hit.primitive);
+        let class = if same { Class::Same } else { self.differing(ray, hit, found.as_ref()) };
+        Verdict { class, t_error, exact: rounded }
     }
 
-    /// Another surface was reported than the right one.
-    fn other(&self, ray: &Ray, hit: &Hit, found: &Surface, right: &Surface) -> Class {
-        let t_right = right.t.expect("an exact hit has an exact t");
-        if self.share_near_edge(ray, found, right) {
-            return Class::Neighbour;
-        }
-        match found.t {
-            Some(t) if !is_in_range(ray, t) => extra(ray, found),
-            Some(t) if (t - t_right).abs() <= found.bound + right.bound => Class::Reordered,
-            None if !found.near_edge => Class::Wrong,
-            // An extra hit before the right one hides it.
-            None if f64::from(hit.t) <= t_right + right.bound => Class::HitNearEdge,
-            _ => self.missing(ray, right),
+    /// Another surface was reported than the right one, or none, or one where there is none.
+    fn differing(&self, ray: &Ray, hit: &Hit, found: Option<&Surface>) -> Class {
+        let reported = found.map_or(Class::Same, |found| reported(ray, found));
+        let all: Vec<Surface> = self.oracle.all(ray).iter().map(|exact| self.surface_of(ray, exact)).collect();
+        let passed = |surface: &&Surface| !surface.is_at(hit) && surface.span.largest < f64::from(hit.t);
+        let excuses: Vec<Class> = all.iter().filter(passed).map(|right| self.missing(ray, right, found)).collect();
+        let first = all.first().zip(found);
+        if reported == Class::Wrong || excuses.contains(&Class::Wrong) {
+            Class::Wrong
+        } else if first.is_some_and(|(right, found)| self.share_near_edge(ray, found, right)) {
+            Class::Neighbour
+        } else if reported != Class::Same {
+            reported
+        } else {
+            // If nothing was passed over, the right surface may as well have come later.
+            excuses.first().copied().unwrap_or(Class::Reordered)
         }
     }
 
-    /// The right surface was not reported, nor one that explains it.
-    fn missing(&self, ray: &Ray, right: &Surface) -> Class {
-        if right.t.is_some_and(|t| is_near_end(ray, t, right.bound)) {
+    /// A surface was not reported, though it comes before the one that was, if any.
+    fn missing(&self, ray: &Ray, right: &Surface, found: Option<&Surface>) -> Class {
+        let (near, far) = ends(ray);
+        if found.is_some_and(|found| self.share_near_edge(ray, found, right)) {
+            Class::Neighbour
+        } else if right.span.least < near || right.span.largest > far {
             Class::Range
         } else if right.near_edge && self.may_be_missed(ray, right) {
             Class::MissNearEdge
@@ -118,18 +136,19 @@ impl<'a> Judge<'a> {
             Shape::Mesh(_) => {
                 let t = crossings.first().map(|crossing| crossing.t.to_f64());
                 let (corners, _) = self.oracle.triangle(instance, primitive).expect("hits name triangles");
-                let TriangleBounds { edge, t: bound, .. } = bounds::triangle(ray, placed, corners, t);
-                // A needle is no excuse: an extra hit far from it would be wrong.
+                let TriangleBounds { edge, t: span, .. } = bounds::triangle(ray, placed, corners, t);
                 let near_edge = self.is_near(ray, instance, corners, edge);
-                Surface { instance, primitive, near_edge, t, bound, edge }
+                Surface { instance, primitive, near_edge, t, span, edge }
             }
             Shape::Quadric(quadric) => {
-                let at = crossings.iter().map(|crossing| (crossing.t.to_f64(), crossing.primitive));
-                let rank = |(t, surface): &(f64, u32)| ((*surface != primitive) as u32, (t - near).abs());
-                let t = at.min_by(|a, b| rank(a).partial_cmp(&rank(b)).expect("t are not NaN")).map(|(t, _)| t);
+                let own = crossings.iter().filter(|crossing| crossing.primitive == primitive);
+                let t = own.map(|crossing| crossing.t.to_f64()).min_by(|a, b| {
+                    let distance = |t: &f64| (t - near).abs();
+                    distance(a).total_cmp(&distance(b))
+                });
                 let quadric = &self.scene.quadrics[quadric as usize];
-                let own = bounds::quadric(ray, placed, quadric, t.unwrap_or(near), primitive);
-                Surface { instance, primitive, near_edge: own.near_edge, t, bound: own.t, edge: 0.0 }
+                let own = bounds::quadric(ray, placed, quadric, primitive, t, near);
+                Surface { instance, primitive, near_edge: own.near_edge, t, span: own.t, edge: 0.0 }
             }
         }
     }
@@ -148,13 +167,14 @@ impl<'a> Judge<'a> {
         self.oracle.triangle(surface.instance, surface.primitive).map(|(corners, _)| corners)
     }
 
-    /// Whether two surfaces are parts of one quadric, or triangles with a common edge or corner near the ray.
+    /// Whether two surfaces are parts of one quadric that meet near the ray, or triangles with a common edge or corner there.
     fn share_near_edge(&self, ray: &Ray, one: &Surface, other: &Surface) -> bool {
         if one.instance != other.instance {
             return false;
         }
         let (Some(corners), Some(others)) = (self.corners(one), self.corners(other)) else {
-            return one.near_edge || other.near_edge;
+            let meet = one.span.least <= other.span.largest && other.span.least <= one.span.largest;
+            return one.near_edge && other.near_edge && meet;
         };
         let shared: Vec<Vec3> = corners.into_iter().filter(|corner| others.contains(corner)).collect();
         let within = one.edge.max(other.edge);
@@ -208,31 +228,22 @@ impl<'a> Judge<'a> {
         let placed = &self.world.instances[instance as usize];
         self.oracle
             .triangle(instance, primitive)
-            .is_some_and(|(corners, _)| bounds::triangle(ray, placed, corners, None).needle)
+            .is_some_and(|(corners, _)| bounds::triangle(ray, placed, corners, None).edge_on)
     }
 }
 
-/// A surface was reported that is not hit exactly, and nothing else is.
-fn extra(ray: &Ray, found: &Surface) -> Class {
+/// Whether a surface may be reported: `Same` if it is hit.
+fn reported(ray: &Ray, found: &Surface) -> Class {
+    let (near, far) = ends(ray);
     match found.t {
-        Some(t) if is_near_end(ray, t, found.bound) => Class::Range,
-        Some(_) => Class::Wrong,
+        Some(t) if t >= near && t <= far => Class::Same,
+        Some(_) if found.span.largest >= near && found.span.least <= far => Class::Range,
         None if found.near_edge => Class::HitNearEdge,
-        None => Class::Wrong,
+        _ => Class::Wrong,
     }
 }
 
 /// The ends of the interval in which the renderer can report hits.
 fn ends(ray: &Ray) -> (f64, f64) {
     (f64::from(ray.t_min).max(0.0), f64::from(ray.t_max.min(f32::MAX)))
-}
-
-fn is_in_range(ray: &Ray, t: f64) -> bool {
-    let (near, far) = ends(ray);
-    t >= near && t <= far
-}
-
-fn is_near_end(ray: &Ray, t: f64, bound: f64) -> bool {
-    let (near, far) = ends(ray);
-    (t - near).abs() <= bound || (t - far).abs() <= bound || t > f64::from(f32::MAX) - bound
 }

@@ -60,7 +60,7 @@ impl Class {
     }
 }
 
-/// A ray whose answers differ.
+/// A ray whose answers differ, or whose t is outside its bound.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Example {
     /// How.
@@ -95,7 +95,7 @@ pub struct Agreement {
 }
 
 /// Examples kept of each class.
-const EXAMPLES: usize = 3;
+const EXAMPLES: usize = 10;
 
 impl Agreement {
     /// How many answers there are of a class.
@@ -103,9 +103,10 @@ impl Agreement {
         self.classes[class as usize]
     }
 
-    /// Whether nothing is wrong: no class `Wrong`, every t within its bound, all structures equal.
+    /// Whether rays were asked and nothing is wrong: no class `Wrong`, every t within its bound, all structures equal.
     pub fn passes(&self) -> bool {
-        self.count(Class::Wrong) == 0
+        self.rays > 0
+            && self.count(Class::Wrong) == 0
             && self.t_outside == 0
             && self.structures_differ == 0
             && self.occluded_differs == 0
@@ -121,7 +122,7 @@ impl Agreement {
         if verdict.t_error.is_nan() || verdict.t_error > self.worst_t {
             self.worst_t = verdict.t_error;
         }
-        let class = if outside && verdict.class == Class::Same { Class::Wrong } else { verdict.class };
+        let class = if outside { Class::Wrong } else { verdict.class };
         if class != Class::Same {
             self.keep(Example { class, ray: *ray, hit: *hit, exact: verdict.exact });
         }
@@ -195,7 +196,10 @@ fn ask_all(judge: &Judge<'_>, renderers: &[Renderer], ray: &Ray, found: &mut Agr
     let Some((first, others)) = renderers.split_first() else { return };
     let hit = first.closest(ray);
     let bits = |hit: &Hit| [hit.t.to_bits(), hit.u.to_bits(), hit.v.to_bits(), hit.instance, hit.primitive];
-    found.structures_differ += others.iter().filter(|other| bits(&other.closest(ray)) != bits(&hit)).count() as u64;
+    for answer in others.iter().map(|other| other.closest(ray)).filter(|answer| bits(answer) != bits(&hit)) {
+        found.structures_differ += 1;
+        found.keep(Example { class: Class::Wrong, ray: *ray, hit: answer, exact: hit });
+    }
     found.occluded_differs += renderers.iter().filter(|renderer| renderer.occluded(ray) != hit.is_hit()).count() as u64;
     found.add(ray, &hit, &judge.judge(ray, &hit));
 }

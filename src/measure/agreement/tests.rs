@@ -105,6 +105,33 @@ fn inside_a_closed_surface_nothing_is_missed() {
 }
 
 #[test]
+fn what_lies_behind_a_lost_silhouette_must_be_found() {
+    let mut scene = scenes::empty();
+    let (points, triangles) = scenes::cube_points();
+    scenes::add_mesh(&mut scene, scenes::mesh_at(&points, triangles).unwrap(), DAffine3::IDENTITY, scenes::white());
+    let wall = [DVec3::new(-9.0, -5.0, -9.0), DVec3::new(9.0, -5.0, -9.0), DVec3::new(0.0, -5.0, 9.0)];
+    let wall = scenes::mesh_at(&wall, vec![[0, 1, 2]]).unwrap();
+    scenes::add_mesh(&mut scene, wall, DAffine3::IDENTITY, scenes::white());
+    let judge = Judge::new(&scene).unwrap();
+    let ray = Ray::new(Vec3::new(1.0, 3.0, 0.25), Vec3::NEG_Y);
+    let wall = Hit { t: 8.0, u: 0.0, v: 0.0, instance: 1, primitive: 0 };
+    assert_eq!(judge.judge(&ray, &wall).class, Class::MissNearEdge);
+    assert_eq!(judge.judge(&ray, &Hit::MISS).class, Class::Wrong, "the wall is lost as well");
+
+    // Beside the cube by an ulp a hit is explained where the cube's top is, and nowhere else.
+    let beside = Ray { origin: Vec3::new(1.0f32.next_up(), 3.0, 0.25), ..ray };
+    let top = judge.judge(&ray, &wall).exact;
+    assert_eq!((top.t, top.instance), (2.0, 0));
+    let verdict = judge.judge(&beside, &top);
+    assert!(verdict.class == Class::HitNearEdge && verdict.t_error <= 1.0, "{verdict:?}");
+    for t in [1.5, 1.9999, 2.0001, 5.0] {
+        assert!(judge.judge(&beside, &Hit { t, ..top }).t_error > 1.0, "{t}");
+    }
+    let farther = Ray { origin: Vec3::new(1.0 + 1e-5, 3.0, 0.25), ..ray };
+    assert_eq!(judge.judge(&farther, &top).class, Class::Wrong);
+}
+
+#[test]
 fn tangents_may_be_lost_and_nothing_beside_them() {
     let mut scene = scenes::empty();
     scenes::add_quadric(&mut scene, shapes::sphere(), DAffine3::IDENTITY, scenes::white());
