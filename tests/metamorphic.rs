@@ -4,7 +4,7 @@
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use proptest::prelude::*;
 use whitted::accel::{Kind, Params, Preset};
-use whitted::geometry::{Hit, Key, Ray, TriangleMesh};
+use whitted::geometry::{Hit, Ray, TriangleMesh};
 use whitted::progress::Silent;
 use whitted::render::Renderer;
 use whitted::scene::Scene;
@@ -106,8 +106,7 @@ fn every_params() -> impl Iterator<Item = Params> {
 
 /// All hits of a ray in order.
 fn all(renderer: &Renderer, ray: &Ray) -> Vec<Hit> {
-    let after = |key: Key| Some(renderer.next_after(ray, key)).filter(Hit::is_hit);
-    std::iter::successors(after(Key::BEFORE_ALL), |hit| after(hit.key())).collect()
+    renderer.hits(ray).collect()
 }
 
 /// Asserts that two questions have the same hits, bit for bit, in every mode of every structure, for wanted rays.

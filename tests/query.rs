@@ -177,22 +177,27 @@ fn origins_are_read_in_the_coordinates_of_the_file() {
 }
 
 #[test]
-fn bad_rays_end_with_line_and_column() {
+fn bad_rays_end_with_line_and_column_after_the_answers_before_them() {
     let workshop = workshop();
-    for (rays, place) in [
-        ("0 0 1 0 0 -1\n0 0 1 0 zero -1\n", "rays.txt:2:9: "),
-        ("0 0 1 0 0\n", "rays.txt:1:10: "),
-        ("\n\n0 0 1 0 0 -1 0 1 2\n", "rays.txt:3:18: "),
-        ("0 0 1 0 0 0x\n", "rays.txt:1:11: "),
+    for (rays, place, answers) in [
+        ("0.75 0.25 2 0 0 -2\n0 0 1 0 zero -1\n0.75 0.25 2 0 0 -2\n", "rays.txt:2:9: ", "1.0 0.5 0.25 0 0\n"),
+        ("0 0 1 0 0\n", "rays.txt:1:10: ", ""),
+        ("\n\n0 0 1 0 0 -1 0 1 2\n", "rays.txt:3:18: ", ""),
+        ("0 0 1 0 0 0x\n", "rays.txt:1:11: ", ""),
     ] {
         workshop.write("rays.txt", rays);
-        let error = workshop.fail("query squares.obj --ray-file rays.txt");
+        let output = workshop.run("query squares.obj --ray-file rays.txt");
+        let error = text(&output.stderr);
+        assert_eq!((output.status.code(), text(&output.stdout).as_str()), (Some(1), answers), "{rays}: {error}");
+        assert_eq!(error.lines().count(), 1, "{rays}: {error}");
         assert!(error.contains(place) && error.contains("ox oy oz dx dy dz"), "{rays}: {error}");
         let error = workshop.fail("query squares.obj --ray-file rays.txt -o out.txt");
         assert!(error.contains(place) && !workshop.path("out.txt").exists(), "{rays}: {error}");
     }
     fs::write(workshop.path("rays.f32"), [0; 40]).unwrap();
-    let error = workshop.fail("query squares.obj --ray-file rays.f32 --format f32");
+    let output = workshop.run("query squares.obj --ray-file rays.f32 --format f32");
+    let error = text(&output.stderr);
+    assert_eq!((output.status.code(), output.stdout.len()), (Some(1), 20), "a miss, then {error}");
     assert!(error.contains("rays.f32: ") && error.contains("byte 32"), "{error}");
     assert!(workshop.fail("query squares.obj --ray-file none.txt").contains("none.txt"));
     assert!(workshop.fail("query none.obj --ray-file rays.txt").contains("none.obj"));

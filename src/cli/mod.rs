@@ -18,8 +18,8 @@ mod precision;
 mod query;
 mod render;
 mod report;
-mod standard_input;
 mod stats_json;
+mod stream;
 mod terminal;
 mod values;
 

@@ -10,13 +10,13 @@ use rayon::prelude::*;
 use super::arguments::{BuildArguments, LoadArguments};
 use super::ledger;
 use super::outputs::refuse_inputs;
-use super::standard_input::StandardInput;
+use super::stream::Stream;
 use super::terminal::Terminal;
 use super::values::one_of;
 use crate::error::{Error, Result};
 use crate::formats::atomic_file::{check_writable, write_atomically};
 use crate::formats::{self, LoadOptions, Loaded};
-use crate::geometry::{Hit, Key, Ray};
+use crate::geometry::{Hit, Ray};
 use crate::measure::hit_file::HitWriter;
 use crate::measure::oracle::Oracle;
 use crate::measure::ray_file::{FileRay, RayReader, RecordFormat};
@@ -103,8 +103,12 @@ pub fn run(arguments: &QueryArguments) -> Result<()> {
     // Answers and a bar on one terminal would be in each other's way.
     let terminal = Terminal::new(to_file.is_none() && io::stdout().is_terminal())?;
     super::use_threads(arguments.build.threads)?;
-    let (source, length): (Box<dyn Read + '_>, u64) =
-        if from_stdin { (Box::new(StandardInput::new(&terminal)), 0) } else { open(&arguments.ray_file)? };
+    let (source, length) = if from_stdin {
+        let stdin: Box<dyn Read + '_> = Box::new(Stream::new(|| Ok(io::stdin()), &terminal));
+        (stdin, 0)
+    } else {
+        open(&arguments.ray_file, &terminal)?
+    };
 
     let options = LoadOptions { faces: arguments.faces, ..arguments.load.options() };
     let loaded = formats::open(&arguments.input, &options, &terminal);
@@ -133,18 +137,22 @@ pub fn run(arguments: &QueryArguments) -> Result<()> {
     answered
 }
 
-/// A file of rays, and how long it is; 0 for what has no length, such as a pipe.
-pub(super) fn open<'a>(path: &Path) -> Result<(Box<dyn Read + 'a>, u64)> {
+/// A file of rays, and how long it is; 0 for what has no length, such as a pipe, for which an interrupt need not wait.
+pub(super) fn open<'a>(path: &Path, progress: &'a dyn Progress) -> Result<(Box<dyn Read + 'a>, u64)> {
     let system = |cause: io::Error| match cause.kind() {
         ErrorKind::NotFound => Error::caller("there is no such file").at_path(path),
         _ => Error::system(path, cause),
     };
-    let file = File::open(path).map_err(system)?;
-    let metadata = file.metadata().map_err(system)?;
+    // Asked before it is opened: opening a pipe waits for someone to write.
+    let metadata = std::fs::metadata(path).map_err(system)?;
     if metadata.is_dir() {
         return Err(Error::caller("is a folder").at_path(path).remedy("name a file of rays in it"));
     }
-    Ok((Box::new(file), metadata.len()))
+    if !metadata.is_file() {
+        let name = path.to_path_buf();
+        return Ok((Box::new(Stream::new(move || File::open(name), progress)), 0));
+    }
+    Ok((Box::new(File::open(path).map_err(system)?), metadata.len()))
 }
 
 /// Writes on; false if the reader went away and wants no more.
@@ -222,7 +230,7 @@ impl Answerer {
         match (self, mode) {
             (Self::F32(renderer), Mode::Closest) => writer.hit(&renderer.closest(ray), out),
             (Self::F32(renderer), Mode::Occluded) => writer.occluded(renderer.occluded(ray), out),
-            (Self::F32(renderer), Mode::All) => writer.all(&every_hit(renderer, ray), out),
+            (Self::F32(renderer), Mode::All) => writer.all(&renderer.hits(ray).collect::<Vec<_>>(), out),
             (Self::Exact(_, oracle), Mode::Closest) => {
                 writer.hit(&oracle.closest(ray).map_or(Hit::MISS, |hit| hit.hit()), out);
             }
@@ -233,10 +241,4 @@ impl Answerer {
             }
         }
     }
-}
-
-/// The renderer's hits, one after the other.
-fn every_hit(renderer: &Renderer, ray: &Ray) -> Vec<Hit> {
-    let next = |key: Key| Some(renderer.next_after(ray, key)).filter(Hit::is_hit);
-    std::iter::successors(next(Key::BEFORE_ALL), |hit| next(hit.key())).collect()
 }

@@ -21,6 +21,7 @@ use crate::measure::report::rays::{RayKind, SEED};
 use crate::measure::report::subject::{HardSet, Subject};
 use crate::measure::report::{self, Options, Plane, Programs, Report};
 use crate::measure::speed::FEWEST_REPETITIONS;
+use crate::progress::Progress;
 
 /// Flags of `report`.
 #[derive(Debug, Args)]
@@ -121,7 +122,8 @@ pub fn run(arguments: &ReportArguments) -> Result<()> {
     let options = options(arguments)?;
     super::use_threads(arguments.threads)?;
     let terminal = Terminal::new(false)?;
-    let file_rays = arguments.ray_file.as_deref().map(|path| read_rays(path, arguments.format)).transpose()?;
+    let file_rays =
+        arguments.ray_file.as_deref().map(|path| read_rays(path, arguments.format, &terminal)).transpose()?;
     let mut report = Report::new(Environment::detect(commit(), SEED), &options);
     let mut stopped = None;
     for part in parts(arguments) {
@@ -226,11 +228,13 @@ fn options(arguments: &ReportArguments) -> Result<Options> {
 }
 
 /// All rays of a file.
-fn read_rays(path: &Path, format: RecordFormat) -> Result<Vec<FileRay>> {
-    let mut reader = RayReader::new(open(path)?.0, format, path);
+fn read_rays(path: &Path, format: RecordFormat, progress: &dyn Progress) -> Result<Vec<FileRay>> {
+    let mut reader = RayReader::new(open(path, progress)?.0, format, path);
     let (mut all, mut some) = (Vec::new(), Vec::new());
     loop {
-        reader.read(&mut some, 1 << 16)?;
+        let read = reader.read(&mut some, 1 << 16);
+        progress.check()?;
+        read?;
         if some.is_empty() {
             return Ok(all);
         }

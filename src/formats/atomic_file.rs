@@ -14,7 +14,8 @@ impl<T: Write + Seek> Sink for T {}
 ///
 /// The content goes to a temporary file in the same folder, which takes the place of `path` once all is there; if
 /// `write` fails, `path` stays as it was. The file gets the permissions of any newly created file. A link is followed.
-/// What is no regular file (a device, a pipe) cannot be replaced: it receives the finished content.
+/// What is no regular file (a device, a pipe), or an open one by its number (`/dev/stdout`, `/dev/fd/3`), cannot be
+/// replaced: the finished content is appended to it.
 ///
 /// # Errors
 /// Those of `write`, and the system's, with the path.
@@ -22,11 +23,11 @@ pub fn write_atomically(path: &Path, write: impl FnOnce(&mut dyn Sink) -> Result
     let system = |cause| Error::system(path, cause);
     match fs::metadata(path) {
         Ok(existing) if existing.is_dir() => return Err(is_a_folder(path)),
-        Ok(existing) if !existing.is_file() => {
+        Ok(existing) if !existing.is_file() || is_descriptor(path) => {
             let mut content = Cursor::new(Vec::new());
             write(&mut content).map_err(|error| error.at_path(path))?;
             return fs::OpenOptions::new()
-                .write(true)
+                .append(true)
                 .open(path)
                 .and_then(|mut file| file.write_all(content.get_ref()))
                 .map_err(system);
@@ -48,9 +49,26 @@ pub fn write_atomically(path: &Path, write: impl FnOnce(&mut dyn Sink) -> Result
 pub fn check_writable(path: &Path) -> Result<()> {
     match fs::metadata(path) {
         Ok(existing) if existing.is_dir() => Err(is_a_folder(path)),
-        Ok(existing) if !existing.is_file() => Ok(()),
+        Ok(existing) if !existing.is_file() || is_descriptor(path) => Ok(()),
         _ => temporary_for(path).map(drop),
     }
+}
+
+/// Whether a path leads to what this process has open already, by its number.
+fn is_descriptor(path: &Path) -> bool {
+    /// Links that are followed; more are a circle.
+    const MOST_LINKS: usize = 40;
+    let Ok(descriptors) = fs::canonicalize("/dev/fd") else { return false };
+    let mut path = path.to_path_buf();
+    for _ in 0..MOST_LINKS {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        if fs::canonicalize(folder).is_ok_and(|folder| folder == descriptors) {
+            return true;
+        }
+        let Ok(target) = fs::read_link(&path) else { return false };
+        path = folder.join(target);
+    }
+    false
 }
 
 fn is_a_folder(path: &Path) -> Error {
@@ -139,6 +157,24 @@ mod tests {
         })
         .unwrap();
         assert_eq!(fs::read_to_string(folder.path().join("plain")).unwrap(), "through");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn what_is_open_already_is_not_replaced() {
+        use std::os::fd::AsRawFd;
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("log");
+        fs::write(&path, "before\n").unwrap();
+        let open = fs::OpenOptions::new().append(true).open(&path).unwrap();
+        let link = folder.path().join("link");
+        std::os::unix::fs::symlink(format!("/dev/fd/{}", open.as_raw_fd()), &link).unwrap();
+        check_writable(&link).unwrap();
+        write_atomically(&link, |sink| sink.write_all(b"new").map_err(|cause| Error::system(Path::new("x"), cause)))
+            .unwrap();
+        (&open).write_all(b" and after").unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "before\nnew and after");
+        assert!(!is_descriptor(&path) && is_descriptor(Path::new("/dev/stdout")));
     }
 
     #[test]

@@ -61,13 +61,15 @@ pub struct RayReader<R> {
     /// Bytes read.
     bytes: u64,
     text: Vec<u8>,
+    /// What is wrong with what comes next.
+    failed: Option<Error>,
 }
 
 impl<R: Read> RayReader<R> {
     /// A reader; `path` is for messages.
     pub fn new(source: R, format: RecordFormat, path: &Path) -> Self {
         let reader = BufReader::with_capacity(BUFFER_BYTES, source);
-        Self { reader, format, path: path.to_path_buf(), line: 0, bytes: 0, text: Vec::new() }
+        Self { reader, format, path: path.to_path_buf(), line: 0, bytes: 0, text: Vec::new(), failed: None }
     }
 
     /// Bytes read so far.
@@ -77,19 +79,30 @@ impl<R: Read> RayReader<R> {
 
     /// Replaces `rays` by the next `most` at most; none are left if it stays empty.
     ///
-    /// What has arrived already is not kept waiting for what has not: a pipe is answered as it is filled.
+    /// What has arrived already is not kept waiting for what has not: a pipe is answered as it is filled. Rays before
+    /// something that is none are given first; the error comes with the next call.
     ///
     /// # Errors
     /// A line that is no ray, with line and column; a ray cut short, with the byte where it begins; the system's.
     pub fn read(&mut self, rays: &mut Vec<FileRay>, most: usize) -> Result<()> {
         rays.clear();
+        if let Some(error) = self.failed.take() {
+            return Err(error);
+        }
         while rays.len() < most && (rays.is_empty() || !self.reader.buffer().is_empty()) {
             let next = match self.format {
-                RecordFormat::Text => self.read_line()?,
-                RecordFormat::F32 => self.read_record()?,
+                RecordFormat::Text => self.read_line(),
+                RecordFormat::F32 => self.read_record(),
             };
-            let Some(ray) = next else { break };
-            rays.extend(ray);
+            match next {
+                Ok(Some(ray)) => rays.extend(ray),
+                Ok(None) => break,
+                Err(error) if rays.is_empty() => return Err(error),
+                Err(error) => {
+                    self.failed = Some(error);
+                    break;
+                }
+            }
         }
         Ok(())
     }
@@ -108,7 +121,11 @@ impl<R: Read> RayReader<R> {
         if length as u64 == LONGEST_LINE {
             return Err(at(Error::file("the line is longer than 65535 bytes").remedy(EXPECTED), 1));
         }
-        parse_line(&self.text).map_err(|(column, message)| at(Error::file(message).remedy(EXPECTED), column)).map(Some)
+        // A mark that some editors put before UTF-8 is no part of the line.
+        let mark = if self.line == 1 && self.text.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
+        parse_line(&self.text[mark..])
+            .map_err(|(column, message)| at(Error::file(message).remedy(EXPECTED), column))
+            .map(Some)
     }
 
     /// The next record; `None` at the end.
@@ -232,6 +249,13 @@ mod tests {
             assert_eq!((error.line(), error.column()), (Some(line), Some(column)), "{text}: {error}");
             assert!(error.message().contains(told) && error.path() == Some(Path::new("rays")), "{text}: {error}");
         }
+        // Rays before it are given.
+        let mut reader = RayReader::new(&b"1 2 3 4 5 6\n1 2 3 4 5 6\nx"[..], RecordFormat::Text, Path::new("rays"));
+        let mut rays = Vec::new();
+        reader.read(&mut rays, 9).unwrap();
+        assert_eq!(rays.len(), 2);
+        assert_eq!(reader.read(&mut rays, 9).unwrap_err().line(), Some(3));
+        assert_eq!(read(b"\xef\xbb\xbf.5 2 3 4 5 6", RecordFormat::Text).unwrap()[0].origin.x, 0.5);
         let endless = vec![b'1'; 1 << 20];
         assert!(read(&endless, RecordFormat::Text).unwrap_err().message().contains("longer"));
         assert!(read(b"\xff\xfe 1 2", RecordFormat::Text).is_err());

@@ -121,6 +121,13 @@ impl Renderer {
         with_structure!(&self.intersect, structure => structure.next_after(ray, key))
     }
 
+    /// Every hit in order.
+    pub fn hits(&self, ray: &Ray) -> impl Iterator<Item = Hit> + '_ {
+        let ray = *ray;
+        let next = move |key: Key| Some(self.next_after(&ray, key)).filter(Hit::is_hit);
+        std::iter::successors(next(Key::BEFORE_ALL), move |hit| next(hit.key()))
+    }
+
     /// [`closest`](Self::closest) for every ray of a slice.
     ///
     /// # Panics

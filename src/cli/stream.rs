@@ -1,4 +1,4 @@
-//! Standard input that an interrupt can end while it waits for more.
+//! Standard input and pipes that an interrupt can end while they wait for more.
 
 use std::io::{self, Read};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
@@ -12,22 +12,29 @@ const PIECE: usize = 1 << 16;
 /// How long an interrupt may go unnoticed.
 const PATIENCE: Duration = Duration::from_millis(50);
 
-/// Standard input, read by a thread of its own: the system's reading cannot be ended from outside.
-pub struct StandardInput<'a> {
+/// Bytes that are read by a thread of its own: the system's opening and reading cannot be ended from outside.
+pub struct Stream<'a> {
     pieces: Receiver<io::Result<Vec<u8>>>,
     current: io::Cursor<Vec<u8>>,
     progress: &'a dyn Progress,
 }
 
-impl<'a> StandardInput<'a> {
-    /// Begins to read. The thread ends with the input, or with the process.
-    pub fn new(progress: &'a dyn Progress) -> Self {
+impl<'a> Stream<'a> {
+    /// Begins to read what `open` gives. The thread ends with the input, or with the process.
+    pub fn new<R: Read>(open: impl FnOnce() -> io::Result<R> + Send + 'static, progress: &'a dyn Progress) -> Self {
         let (sender, pieces) = sync_channel(4);
         std::thread::spawn(move || {
-            let mut stdin = io::stdin().lock();
+            let mut source = match open() {
+                Ok(source) => source,
+                Err(error) => {
+                    // Nobody may be left to hear it.
+                    let _ = sender.send(Err(error));
+                    return;
+                }
+            };
             loop {
                 let mut piece = vec![0; PIECE];
-                let read = stdin.read(&mut piece).map(|length| {
+                let read = source.read(&mut piece).map(|length| {
                     piece.truncate(length);
                     piece
                 });
@@ -42,7 +49,7 @@ impl<'a> StandardInput<'a> {
     }
 }
 
-impl Read for StandardInput<'_> {
+impl Read for Stream<'_> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         loop {
             let length = self.current.read(buffer)?;
