@@ -249,6 +249,14 @@ fn a_model_is_compared_with_exact_answers() {
     // Rays, hits, seven classes of which the last is `wrong`, the worst t, those outside their bound, structures that differ.
     assert_eq!((words.len(), words[1], words[9], words[11], words[12]), (13, "900", "0", "0", "0"), "{table}");
     assert_eq!(table, text(&workshop.succeed("check --model scene.toml --rays 900 --threads 1")));
+    let document = text(&workshop.succeed("check --model scene.toml --rays 90 --json"));
+    let document: serde_json::Value = serde_json::from_str(&document).unwrap();
+    assert_eq!(
+        (&document["schema"], &document["passed"], &document["all"]["rays"]),
+        (&1.into(), &true.into(), &90.into())
+    );
+    assert!(document["structures"].as_array().unwrap().contains(&"bvh2 best".into()));
+    assert_eq!(workshop.run("check --model scene.toml --rays 0").status.code(), Some(2));
     assert!(workshop.fail("check --model none.obj").contains("none.obj"));
     assert_eq!(workshop.run("check D1 --model scene.toml").status.code(), Some(2));
 }

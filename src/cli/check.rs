@@ -15,6 +15,9 @@ use crate::measure::cases::{self, Case, Context, Effort, Failure, Figure, Outcom
 use crate::measure::hexadecimal::hexadecimal;
 use crate::progress::Progress;
 
+/// More are not asked about one model: some years of them.
+const MOST_RAYS: u64 = 1 << 48;
+
 /// Flags of `check`.
 #[derive(Debug, Args)]
 pub struct CheckArguments {
@@ -28,10 +31,11 @@ pub struct CheckArguments {
     #[arg(long)]
     pub json: bool,
     /// Instead of the cases, compare the answers to rays of many kinds with exact ones, on this scene or model.
-    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath, conflicts_with_all = ["cases", "full", "json"])]
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath, conflicts_with_all = ["cases", "full"])]
     pub model: Option<PathBuf>,
-    /// How many rays are compared on a model.
-    #[arg(long, value_name = "N", default_value_t = 100_000, requires = "model")]
+    /// How many rays are compared on a model, at least 1.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MOST_RAYS), default_value_t = 100_000)]
+    #[arg(requires = "model")]
     pub rays: u64,
     /// Structures to ask; may be given more than once. All of them if it is not given.
     #[arg(long, value_name = "KIND", value_parser = values::one_of(arguments::accelerators()))]
