@@ -118,7 +118,7 @@ for_each_accelerator!(define_kind {});
 impl Kind {
     /// The structure itself: `Auto` becomes the one that measures fastest.
     pub fn resolve(self) -> Self {
-        if self == Self::Auto { Self::Bvh2 } else { self }
+        if self == Self::Auto { Self::CwBvh } else { self }
     }
 }
 

@@ -63,6 +63,9 @@ impl Surface {
     }
 }
 
+/// The most triangles in a [chain](Judge::chain): more lie around no corner of a mesh that is not degenerate.
+const LONGEST_CHAIN: usize = 32;
+
 impl<'a> Judge<'a> {
     /// Prepares the oracle and which triangles are neighbours.
     ///
@@ -178,11 +181,39 @@ impl<'a> Judge<'a> {
         };
         let shared: Vec<Vec3> = corners.into_iter().filter(|corner| others.contains(corner)).collect();
         let within = one.edge.max(other.edge);
-        match shared[..] {
+        let meet = match shared[..] {
             [a] => self.line_distance(ray, one.instance, [a, a]) <= within,
             [a, b, ..] => self.line_distance(ray, one.instance, [a, b]) <= within,
             [] => false,
+        };
+        meet || self.chain(ray, one).contains(&other.primitive)
+    }
+
+    /// The triangles that rounding can put in a triangle's place, itself first: over an edge that the ray passes within the
+    /// bound to the next triangle, and if that is so narrow as the ray sees it that another of its edges is as near, over that
+    /// one too. Narrow strips are seen nearly edge-on, one after the other along a silhouette.
+    fn chain(&self, ray: &Ray, from: &Surface) -> Vec<u32> {
+        let mut chain = vec![from.primitive];
+        let Shape::Mesh(mesh) = self.world.instances[from.instance as usize].shape else { return chain };
+        let neighbours = &self.neighbours[mesh as usize];
+        let mut at = 0;
+        while let Some(&number) = chain.get(at)
+            && chain.len() < LONGEST_CHAIN
+        {
+            at += 1;
+            let Some((corners, _)) = self.oracle.triangle(from.instance, number) else { continue };
+            let placed = &self.world.instances[from.instance as usize];
+            let within = bounds::triangle(ray, placed, corners, None).edge;
+            let [a, b, c] = corners;
+            for [from_corner, to_corner] in [[a, b], [b, c], [c, a]] {
+                if self.line_distance(ray, from.instance, [from_corner, to_corner]) <= within {
+                    let next = neighbours.along(from_corner, to_corner).filter(|next| !chain.contains(next));
+                    let next: Vec<u32> = next.collect();
+                    chain.extend(next);
+                }
+            }
         }
+        chain
     }
 
     /// Whether a surface may be missed near its edge: a quadric at a tangent or cut; a triangle at a border, or where what
@@ -197,6 +228,9 @@ impl<'a> Judge<'a> {
             // A triangle seen edge-on is a silhouette of both sides.
             other * own <= 0.0 || self.is_edge_on(ray, surface.instance, number)
         };
+        if self.chain(ray, surface).into_iter().any(differs) {
+            return true;
+        }
         let is_near = |ends: [Vec3; 2]| self.line_distance(ray, surface.instance, ends) <= surface.edge;
         let edges = [[a, b], [b, c], [c, a]];
         let over_edge = edges
