@@ -4,6 +4,7 @@ use glam::{DVec3, Vec3};
 
 use crate::geometry::TriangleMesh;
 use crate::math::vector::normalize;
+use crate::measure::scenes::sphere_points;
 use crate::scene::{Material, Object, Scene, Shape};
 
 /// A scene of meshes where they are, each an object of its own.
@@ -39,27 +40,8 @@ pub fn moved(of: &TriangleMesh, to: impl Fn(Vec3) -> Vec3) -> TriangleMesh {
 /// A closed sphere of `rings` x `segments` quads cut into triangles, poles shared, about `center`, along y; faces
 /// outward. Vertices are computed in f64 and rounded once.
 pub fn sphere(rings: u32, segments: u32, radius: f64, center: DVec3) -> TriangleMesh {
-    let point = |ring: u32, segment: u32| {
-        let theta = std::f64::consts::PI * f64::from(ring) / f64::from(rings);
-        let phi = std::f64::consts::TAU * f64::from(segment) / f64::from(segments);
-        let out = DVec3::new(libm::sin(theta) * libm::cos(phi), libm::cos(theta), libm::sin(theta) * libm::sin(phi));
-        (center + out * radius).as_vec3()
-    };
-    let mut positions = vec![point(0, 0)];
-    positions.extend((1..rings).flat_map(|ring| (0..segments).map(move |segment| point(ring, segment))));
-    positions.push(point(rings, 0));
-    let last = positions.len() as u32 - 1;
-    let at = |ring: u32, segment: u32| 1 + (ring - 1) * segments + segment % segments;
-    let mut indices = Vec::new();
-    for s in 0..segments {
-        indices.push([0, at(1, s + 1), at(1, s)]);
-        indices.push([last, at(rings - 1, s), at(rings - 1, s + 1)]);
-        for ring in 1..rings - 1 {
-            let (a, b, c, d) = (at(ring, s), at(ring, s + 1), at(ring + 1, s + 1), at(ring + 1, s));
-            indices.extend([[a, b, c], [a, c, d]]);
-        }
-    }
-    mesh(positions, indices)
+    let (points, indices) = sphere_points(rings, segments);
+    mesh(points.into_iter().map(|out| (center + out * radius).as_vec3()).collect(), indices)
 }
 
 /// An icosahedron whose faces were quartered `level` times and its vertices put on the sphere; 20 * 4^level triangles,
