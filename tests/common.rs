@@ -97,31 +97,8 @@ pub fn cube() -> TriangleMesh {
 
 /// A closed sphere of `rings` x `segments` quads cut into triangles, poles shared; faces outward.
 pub fn sphere_mesh(radius: f64, center: DVec3, rings: u32, segments: u32) -> TriangleMesh {
-    let mut positions = Vec::new();
-    let point = |theta: f64, phi: f64| {
-        let p = DVec3::new(theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin()) * radius + center;
-        Vec3::new(p.x as f32, p.y as f32, p.z as f32)
-    };
-    positions.push(point(0.0, 0.0));
-    for ring in 1..rings {
-        for segment in 0..segments {
-            let theta = std::f64::consts::PI * f64::from(ring) / f64::from(rings);
-            positions.push(point(theta, std::f64::consts::TAU * f64::from(segment) / f64::from(segments)));
-        }
-    }
-    positions.push(point(std::f64::consts::PI, 0.0));
-    let last = positions.len() as u32 - 1;
-    let at = |ring: u32, segment: u32| 1 + (ring - 1) * segments + segment % segments;
-    let mut indices = Vec::new();
-    for s in 0..segments {
-        indices.push([0, at(1, s + 1), at(1, s)]);
-        indices.push([last, at(rings - 1, s), at(rings - 1, s + 1)]);
-        for ring in 1..rings - 1 {
-            let (a, b, c, d) = (at(ring, s), at(ring, s + 1), at(ring + 1, s + 1), at(ring + 1, s));
-            indices.push([a, b, c]);
-            indices.push([a, c, d]);
-        }
-    }
+    let (points, indices) = whitted::measure::scenes::sphere_points(rings, segments);
+    let positions = points.into_iter().map(|p| (p * radius + center).as_vec3()).collect();
     TriangleMesh { positions, indices, ..TriangleMesh::default() }
 }
 

@@ -9,12 +9,11 @@ use super::meshes::{self, Turn};
 use super::watertight::{FAR, outward_ray};
 use super::{Case, Context, Failure, Outcome, Rays, scene_seed};
 use crate::error::Result;
-use crate::geometry::{Hit, Key, Ray};
+use crate::geometry::{Hit, Ray};
 use crate::math::float::UNIT_ROUNDOFF;
 use crate::math::random::Random;
 use crate::measure::oracle::Oracle;
 use crate::measure::oracle::triangle::meet_ray;
-use crate::render::Renderer;
 
 /// The cases of this file.
 pub const CASES: &[Case] = &[
@@ -44,19 +43,6 @@ pub const CASES: &[Case] = &[
     },
 ];
 
-/// Every hit of a ray, in order.
-fn all_hits(renderer: &Renderer, ray: &Ray) -> Vec<Hit> {
-    let mut hits: Vec<Hit> = Vec::new();
-    loop {
-        let after = hits.last().map_or(Key::BEFORE_ALL, Hit::key);
-        let hit = renderer.next_after(ray, after);
-        if !hit.is_hit() {
-            return hits;
-        }
-        hits.push(hit);
-    }
-}
-
 /// The rays of D1: each hit's triangle is as near to the ray, exactly, as rounding the numbers that enter allows.
 fn tight_hits(context: &Context<'_>) -> Result<Outcome> {
     const EACH: Rays = Rays { quick: 3_000, full: 1_000_000, linear: 50 };
@@ -74,7 +60,7 @@ fn tight_hits(context: &Context<'_>) -> Result<Outcome> {
         sum =
             sum.and(context.ask_all(&scene, scene_seed(0xd2, place), EACH, |structure, random, number, outcome| {
                 let ray = outward_ray(mesh, center, 1.0, random, number);
-                let hits = all_hits(&structure.renderer, &ray);
+                let hits: Vec<Hit> = structure.renderer.hits(&ray).collect();
                 for hit in &hits {
                     let corners = mesh.triangle(hit.primitive);
                     let apart = exact::apart(&ray, corners);

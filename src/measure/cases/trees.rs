@@ -10,7 +10,7 @@ use super::watertight::FAR;
 use super::{Case, Context, Failure, Outcome, Rays, Structure, scene_seed};
 use crate::accel::Kind;
 use crate::error::Result;
-use crate::geometry::{Hit, Key, Ray, TriangleMesh};
+use crate::geometry::{Hit, Ray, TriangleMesh};
 use crate::math::random::Random;
 use crate::measure::oracle::Oracle;
 use crate::measure::statistics::median;
@@ -172,7 +172,7 @@ fn audit(context: &Context<'_>) -> Result<Outcome> {
             let structure = structure?;
             let violation = structure.renderer.validate();
             sum.check(violation.is_ok(), || Failure::text(format!("{structure}, mesh {number}: {violation:?}")));
-            let (seed, total) = (scene_seed(0xd18, number), context.count(60, 10_000));
+            let (seed, total) = (scene_seed(0xd18, number), context.count(60, 500));
             sum = sum.and(context.for_params(&structure.params, seed, total, |random, _, outcome| {
                 let ray = at_one(&triangles, random);
                 // About the mesh's middle, in the scale of the world.
@@ -181,7 +181,8 @@ fn audit(context: &Context<'_>) -> Result<Outcome> {
                 let size = triangles[0].map(|p| (p.as_dvec3() - origin).abs().max_element())[0].max(1e-3) * scale;
                 let start = (origin * scale + random.direction() * (2.0 * size)).as_vec3();
                 let ray = Ray::new(start, target.as_vec3() - start);
-                let walks = [&structure, &reference].map(|structure| walk(structure, &ray));
+                let walks = [&structure, &reference]
+                    .map(|structure| structure.renderer.hits(&ray).take(64).collect::<Vec<Hit>>());
                 outcome.check(walks[0] == walks[1], || {
                     Failure::of_ray(
                         &ray,
@@ -192,17 +193,4 @@ fn audit(context: &Context<'_>) -> Result<Outcome> {
         }
     }
     Ok(sum)
-}
-
-/// Up to the first 64 hits, in order.
-fn walk(structure: &Structure, ray: &Ray) -> Vec<Hit> {
-    let mut hits: Vec<Hit> = Vec::new();
-    while hits.len() < 64 {
-        let hit = structure.renderer.next_after(ray, hits.last().map_or(Key::BEFORE_ALL, Hit::key));
-        if !hit.is_hit() {
-            break;
-        }
-        hits.push(hit);
-    }
-    hits
 }

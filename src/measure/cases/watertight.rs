@@ -10,6 +10,7 @@ use crate::geometry::{Ray, TriangleMesh};
 use crate::math::random::Random;
 use crate::math::vector::{dot, length};
 use crate::measure::oracle::Oracle;
+use crate::measure::scenes::ulp;
 use crate::scene::Scene;
 
 /// The cases of this file.
@@ -225,7 +226,7 @@ fn far_spheres(context: &Context<'_>) -> Result<Outcome> {
             let off = |p: Vec3| dot(normal, p.as_dvec3() - corners[0].as_dvec3()).abs();
             let p = ray.origin + ray.direction * hit.t;
             let largest = p.abs().max_element().max(ray.origin.abs().max_element());
-            let error = off(p) / ulp(largest);
+            let error = off(p) / ulp(largest.into());
             let kind = context.kinds.iter().position(|kind| *kind == structure.params.kind);
             if let Some(kind) = kind {
                 along[kind].add(error);
@@ -233,7 +234,7 @@ fn far_spheres(context: &Context<'_>) -> Result<Outcome> {
             outcome.figure("o + t d off the plane, in ulp, at most", error, Some(16.0));
             let [a, b, c] = corners;
             let p = a + (b - a) * hit.u + (c - a) * hit.v;
-            let error = off(p) / ulp(p.abs().max_element());
+            let error = off(p) / ulp(p.abs().max_element().into());
             outcome.figure("A + u (B - A) + v (C - A) off the plane, in ulp, at most", error, Some(2.0));
         })?);
         // One for each distance, the largest of all kinds.
@@ -243,11 +244,6 @@ fn far_spheres(context: &Context<'_>) -> Result<Outcome> {
         }
     }
     Ok(sum)
-}
-
-/// The distance from one f32 to the next.
-fn ulp(x: f32) -> f64 {
-    f64::from(x.next_up()) - f64::from(x)
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ use super::ray_set::{Answered, Group, Question};
 use crate::geometry::{Hit, Ray, TriangleMesh};
 use crate::math::float::UNIT_ROUNDOFF;
 use crate::math::vector::{cross, dot, length};
+use crate::measure::scenes::ulp;
 use crate::measure::statistics::{Median, quantile};
 use crate::measure::sweep::{Cost, Range, dominated};
 
@@ -162,12 +163,6 @@ fn ns_per_ray(rows: &[QueryRow], group: Group, name: &str) -> Option<Median> {
 
 fn cost(row: &AccuracyRow) -> Cost {
     Cost::of_time(row.ns_per_ray, [Range::exactly(row.t_normalized.p99_99); 2])
-}
-
-/// The distance of f32 numbers at a value.
-pub fn ulp(x: f64) -> f64 {
-    let x = x.abs() as f32;
-    f64::from(x.next_up()) - f64::from(x)
 }
 
 /// Radians between two vectors; 0 if one has no length.

@@ -1,6 +1,7 @@
 //! Sets of rays, and fingerprints of rays and answers.
 
 use crate::geometry::{Hit, Ray};
+use crate::measure::rays;
 
 /// Whether rays are like those of pictures, or aimed at what is hard.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -94,23 +95,14 @@ impl Answered {
     }
 }
 
-/// FNV-1a, 64 bits, of values of 32 bits taken as little-endian bytes; sixteen hexadecimal digits.
+/// The [`rays::fingerprint`] of values of 32 bits; sixteen hexadecimal digits.
 fn fingerprint(values: &[u32]) -> String {
-    let bytes = values.iter().flat_map(|value| value.to_le_bytes());
-    let step = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
-    format!("{:016x}", bytes.fold(0xcbf2_9ce4_8422_2325, step))
+    format!("{:016x}", rays::fingerprint(values.iter().copied()))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn fingerprints_are_those_of_fnv() {
-        // Of the bytes "foob" and of none, from the authors' test vectors.
-        assert_eq!(fingerprint(&[u32::from_le_bytes(*b"foob")]), "dd120e790c2512af");
-        assert_eq!(fingerprint(&[]), "cbf29ce484222325");
-    }
 
     #[test]
     fn answers_that_differ_have_different_hashes() {

@@ -3,7 +3,7 @@
 use glam::{DAffine3, DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::accuracy::{Spread, angle, ulp};
+use super::accuracy::{Spread, angle};
 use super::query::Effort;
 use super::ray_set::Group;
 use super::rays::SEED;
@@ -12,6 +12,7 @@ use crate::geometry::{Ray, shapes};
 use crate::math::random::Random;
 use crate::math::vector::{basis, dot, length, normalize};
 use crate::measure::oracle::Oracle;
+use crate::measure::scenes::ulp;
 use crate::measure::speed::interleaved;
 use crate::measure::statistics::Median;
 use crate::measure::sweep::{Cost, Range, Rate, dominated};
