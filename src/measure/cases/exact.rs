@@ -15,9 +15,11 @@ pub const TIGHTNESS: f64 = 8.0 * UNIT_ROUNDOFF;
 /// How far a hit may be from where it is, as [`t_error`] counts.
 pub const T_TIGHTNESS: f64 = 4.0;
 
-/// The largest distance of a vertex from the ray's origin.
+/// The largest distance of a vertex from the ray's origin, at least the least normal number: f32 tells no points apart that
+/// are nearer than u times that.
 pub fn reach(ray: &Ray, corners: [Vec3; 3]) -> f64 {
-    corners.map(|p| length(p.as_dvec3() - ray.origin.as_dvec3())).into_iter().fold(0.0, f64::max)
+    let least = f64::from(f32::MIN_POSITIVE);
+    corners.map(|p| length(p.as_dvec3() - ray.origin.as_dvec3())).into_iter().fold(least, f64::max)
 }
 
 /// The distance of a ray's line from the nearest edge of a triangle, in parts of the [`reach`].
