@@ -38,7 +38,7 @@
 //! | [`accel`] | structures over triangles, and the tree over instances |
 //! | [`render`] | the seed's call graph: ray_tracing, trace, intersect, shade |
 //! | [`formats`] | OBJ, glTF and scene files in, pictures out |
-//! | `measure` | exact answers, the hard cases, speed against error, behind the feature `measure` |
+//! | `measure` | exact answers, the hard cases, speed against error, the bench, behind the feature `measure` |
 //! | `cli` | the command line, behind the feature `cli` |
 //!
 //! Imports go one way: `math, error, progress -> geometry -> {scene, accel} -> render -> formats -> measure ->

@@ -56,6 +56,8 @@ impl Workshop {
     pub fn command(&self, arguments: &str) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_whitted"));
         command.args(arguments.split_whitespace()).current_dir(self.folder.path()).stdin(Stdio::null());
+        // What the tests' user has set must not take part.
+        command.env_remove("WHITTED_EMBREE");
         command
     }
 

@@ -18,7 +18,7 @@ fn wrong(row: &Value) -> u64 {
 }
 
 /// Panics unless a text is well-formed XML of tags, attributes and text: what a plot needs of it.
-fn assert_well_formed(xml: &str) {
+pub fn assert_well_formed(xml: &str) {
     let mut open = Vec::new();
     let mut rest = xml.trim();
     while let Some(start) = rest.find('<') {

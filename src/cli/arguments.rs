@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueHint};
 use clap_complete::Shell;
 
+use super::bench::BenchArguments;
 use super::check::CheckArguments;
 use super::diff::DiffArguments;
 use super::precision::Precision;
@@ -45,6 +46,8 @@ pub enum Command {
     Query(Box<QueryArguments>),
     /// Measure speed against error on models, scenes or built-in hard meshes, as tables and plots.
     Report(ReportArguments),
+    /// Compare acceleration structures, and Embree, on the same rays: which suits this model?
+    Bench(Box<BenchArguments>),
     /// Print a shell's completion script to standard output.
     Completions {
         /// The shell.
@@ -220,7 +223,9 @@ const VIEWS: [(&str, View); 7] = [
 const UP_AXES: [(&str, UpAxis); 2] = [("y", UpAxis::Y), ("z", UpAxis::Z)];
 const NORMAL_MODES: [(&str, NormalMode); 3] =
     [("file", NormalMode::File), ("flat", NormalMode::Flat), ("smooth", NormalMode::Smooth)];
-const PRESETS: [(&str, Preset); 3] = [("fast", Preset::Fast), ("balanced", Preset::Balanced), ("best", Preset::Best)];
+/// The presets by name.
+pub const PRESETS: [(&str, Preset); 3] =
+    [("fast", Preset::Fast), ("balanced", Preset::Balanced), ("best", Preset::Best)];
 
 impl FilmArguments {
     /// Replaces those fields that were given.

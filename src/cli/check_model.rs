@@ -14,10 +14,11 @@ use super::terminal::{self, Terminal};
 use crate::accel::{Kind, Params, Preset};
 use crate::error::{Error, Result};
 use crate::formats::{self, LoadOptions};
-use crate::geometry::{Hit, Ray};
+use crate::geometry::Hit;
 use crate::measure::agreement::{self, Agreement, Class, Example};
-use crate::measure::hexadecimal::{hexadecimal, hexadecimal_f64};
+use crate::measure::hexadecimal::hexadecimal;
 use crate::measure::machine::Machine;
+use crate::measure::ray_file::RayText;
 use crate::measure::rays::RayFamily;
 
 /// Asks rays of every family, each of every structure with every preset, and prints how the answers compare, a line a
@@ -105,8 +106,7 @@ fn line(name: &str, agreement: &Agreement, text: &mut String) {
 }
 
 fn describe(family: &str, Example { class, ray, hit, exact }: &Example, origin: DVec3, text: &mut String) {
-    let RayText { origin, direction, t_min, t_max } = ray_text(ray, origin);
-    let _ = writeln!(text, "{} ({family}): {} {} {t_min} {t_max}", class.name(), origin.join(" "), direction.join(" "));
+    let _ = writeln!(text, "{} ({family}): {}", class.name(), RayText::of(ray, origin));
     let answer = |hit: &Hit| {
         if hit.is_hit() {
             format!("t {} on {} {}", hexadecimal(hit.t), hit.instance, hit.primitive)
@@ -115,27 +115,6 @@ fn describe(family: &str, Example { class, ray, hit, exact }: &Example, origin: 
         }
     };
     let _ = writeln!(text, "    renderer: {}; exact: {}", answer(hit), answer(exact));
-}
-
-/// A ray in the file's coordinates, as `query` reads it.
-#[derive(Serialize)]
-struct RayText {
-    origin: [String; 3],
-    direction: [String; 3],
-    t_min: String,
-    t_max: String,
-}
-
-fn ray_text(ray: &Ray, origin: DVec3) -> RayText {
-    let own = ray.origin.as_dvec3();
-    // Nothing is added where there is nothing to add: -0 stays.
-    let placed = |axis: usize| if origin[axis] == 0.0 { own[axis] } else { own[axis] + origin[axis] };
-    RayText {
-        origin: [0, 1, 2].map(|axis| hexadecimal_f64(placed(axis))),
-        direction: ray.direction.to_array().map(hexadecimal),
-        t_min: hexadecimal(ray.t_min),
-        t_max: hexadecimal(ray.t_max),
-    }
 }
 
 /// What `check --model --json` writes. Documented in the manual's page on the command line.
@@ -201,7 +180,7 @@ fn document(
     };
     let example = |example: &Example| ExampleText {
         class: example.class,
-        ray: ray_text(&example.ray, origin),
+        ray: RayText::of(&example.ray, origin),
         renderer: hit(example.hit),
         exact: hit(example.exact),
     };
@@ -239,6 +218,7 @@ fn counts(agreement: &Agreement) -> Counts {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::Ray;
     use crate::measure::ray_file::{RayReader, RecordFormat};
     use glam::Vec3;
 

@@ -4,10 +4,12 @@
 //! or exits. The manual page is [`crate::manual::command_line`].
 
 pub mod arguments;
+mod bench;
 mod camera;
 mod check;
 mod check_json;
 mod check_model;
+mod commit;
 mod completions;
 mod diff;
 mod info;
@@ -16,6 +18,7 @@ mod ledger;
 mod outputs;
 mod precision;
 mod query;
+mod ray_input;
 mod render;
 mod report;
 mod stats_json;
@@ -47,6 +50,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         Command::Check(arguments) => check::run(arguments),
         Command::Query(arguments) => query::run(arguments),
         Command::Report(arguments) => report::run(arguments),
+        Command::Bench(arguments) => bench::run(arguments),
         Command::Completions { shell } => completions::run(*shell),
     }
 }

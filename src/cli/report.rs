@@ -2,26 +2,26 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 use clap::{Args, ValueHint};
 
-use super::query::{FORMATS, open};
+use super::commit::commit;
+use super::query::FORMATS;
+use super::ray_input::{MOST_RAYS, read_rays, stem};
 use super::terminal::{self, Terminal};
 use super::values::{self, one_of};
 use super::{arguments, ledger};
 use crate::error::{Error, Result};
 use crate::formats::atomic_file::{check_writable, write_atomically};
 use crate::formats::{self, Loaded};
-use crate::measure::ray_file::{FileRay, RayReader, RecordFormat};
-use crate::measure::report::environment::Environment;
+use crate::measure::environment::Environment;
+use crate::measure::ray_file::RecordFormat;
+use crate::measure::ray_set::{Group, Question, RaySet};
 use crate::measure::report::query::Effort;
-use crate::measure::report::ray_set::{Group, Question, RaySet};
 use crate::measure::report::rays::{RayKind, SEED};
 use crate::measure::report::subject::{HardSet, Subject};
 use crate::measure::report::{self, Options, Plane, Programs, Report};
 use crate::measure::speed::FEWEST_REPETITIONS;
-use crate::progress::Progress;
 
 /// Flags of `report`.
 #[derive(Debug, Args)]
@@ -72,9 +72,6 @@ pub struct ReportArguments {
     pub load: arguments::LoadArguments,
 }
 
-/// The answers of all choices are held at once: 20 bytes a ray and choice.
-const MOST_RAYS: u32 = 10_000_000;
-
 fn hard_sets() -> impl Iterator<Item = (&'static str, HardSet)> {
     HardSet::ALL.into_iter().map(|set| (set.name(), set))
 }
@@ -123,7 +120,7 @@ pub fn run(arguments: &ReportArguments) -> Result<()> {
     super::use_threads(arguments.threads)?;
     let terminal = Terminal::new(false)?;
     let file_rays =
-        arguments.ray_file.as_deref().map(|path| read_rays(path, arguments.format, &terminal)).transpose()?;
+        arguments.ray_file.as_deref().map(|path| read_rays(path, Some(arguments.format), &terminal)).transpose()?;
     let mut report = Report::new(Environment::detect(commit(), SEED), &options);
     let mut stopped = None;
     for part in parts(arguments) {
@@ -193,10 +190,6 @@ impl Part<'_> {
     }
 }
 
-fn stem(path: &Path) -> String {
-    path.file_stem().map_or_else(|| "scene".into(), |stem| stem.to_string_lossy().into_owned())
-}
-
 fn first_name(arguments: &ReportArguments) -> String {
     match (arguments.input.first(), arguments.hard_set.first()) {
         (Some(path), _) => stem(path),
@@ -227,25 +220,6 @@ fn options(arguments: &ReportArguments) -> Result<Options> {
     })
 }
 
-/// All rays of a file.
-fn read_rays(path: &Path, format: RecordFormat, progress: &dyn Progress) -> Result<Vec<FileRay>> {
-    let mut reader = RayReader::new(open(path, progress)?.0, format, path);
-    let (mut all, mut some) = (Vec::new(), Vec::new());
-    loop {
-        let read = reader.read(&mut some, 1 << 16);
-        progress.check()?;
-        read?;
-        if some.is_empty() {
-            return Ok(all);
-        }
-        all.append(&mut some);
-        if all.len() > MOST_RAYS as usize {
-            let message = format!("there are more than the {MOST_RAYS} rays that a report holds");
-            return Err(Error::limit(message).at_path(path).remedy("split the file"));
-        }
-    }
-}
-
 /// Finds out whether a folder is there or can be made, and whether files can be written to it, without making it.
 fn check_folder(folder: &Path) -> Result<()> {
     let nearest = folder.ancestors().find(|ancestor| ancestor.as_os_str().is_empty() || ancestor.exists());
@@ -267,24 +241,4 @@ fn write(report: &Report, folder: &Path) -> Result<()> {
         })?;
     }
     Ok(())
-}
-
-/// The commit of the checkout that the program stands in, with `-dirty` where files differ from it now; it was built from
-/// that unless the checkout has changed since. `None` where the program is not in a checkout's folder of build products,
-/// or git is not there.
-fn commit() -> Option<String> {
-    let program = std::env::current_exe().ok()?;
-    let root = program.ancestors().skip(1).find(|folder| folder.join("Cargo.toml").is_file())?;
-    let manifest = fs::read_to_string(root.join("Cargo.toml")).ok()?;
-    if !manifest.lines().any(|line| line.trim() == concat!("name = \"", env!("CARGO_PKG_NAME"), "\"")) {
-        return None;
-    }
-    let output = Command::new("git")
-        .arg("-C")
-        .arg(root)
-        .args(["describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"])
-        .output()
-        .ok()?;
-    let name = String::from_utf8(output.stdout).ok()?;
-    (output.status.success() && !name.trim().is_empty()).then(|| name.trim().to_owned())
 }

@@ -11,6 +11,7 @@ use glam::{DVec3, Vec3};
 
 use crate::error::{Error, Result};
 use crate::geometry::Ray;
+use crate::measure::hexadecimal::{hexadecimal, hexadecimal_f64};
 
 /// How rays and answers are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,6 +40,41 @@ impl FileRay {
     pub fn relative_to(&self, origin: DVec3) -> Ray {
         let Self { direction, t_min, t_max, .. } = *self;
         Ray { origin: (self.origin - origin).as_vec3(), t_min, direction, t_max }
+    }
+}
+
+/// A ray in a file's coordinates as it is written: every number exactly, and read back as the same ray.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct RayText {
+    /// Where it starts.
+    pub origin: [String; 3],
+    /// Where it goes.
+    pub direction: [String; 3],
+    /// The smallest t that counts.
+    pub t_min: String,
+    /// The largest t that counts.
+    pub t_max: String,
+}
+
+impl RayText {
+    /// A ray that is relative to `origin`.
+    pub fn of(ray: &Ray, origin: DVec3) -> Self {
+        let own = ray.origin.as_dvec3();
+        // Nothing is added where there is nothing to add: -0 stays.
+        let placed = |axis: usize| if origin[axis] == 0.0 { own[axis] } else { own[axis] + origin[axis] };
+        Self {
+            origin: [0, 1, 2].map(|axis| hexadecimal_f64(placed(axis))),
+            direction: ray.direction.to_array().map(hexadecimal),
+            t_min: hexadecimal(ray.t_min),
+            t_max: hexadecimal(ray.t_max),
+        }
+    }
+}
+
+impl std::fmt::Display for RayText {
+    /// The line of a file.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} {} {} {}", self.origin.join(" "), self.direction.join(" "), self.t_min, self.t_max)
     }
 }
 

@@ -3,14 +3,14 @@
 use std::fmt::Write as _;
 
 use super::accuracy::{AccuracyRow, Spread};
-use super::environment::Environment;
 use super::image::{CONVERGED_SAMPLES, ErrorKind};
 use super::own_scenes;
 use super::pictures::{image_name, name};
 use super::query::QueryRow;
-use super::ray_set::{Group, Question};
 use super::spawn::SpawnRow;
 use super::{File, Report, SubjectReport};
+use crate::measure::environment::Environment;
+use crate::measure::ray_set::{Group, Question};
 use crate::measure::statistics::{Median, rate_bound};
 use crate::measure::table::Table;
 

@@ -10,13 +10,11 @@
 pub mod accuracy;
 pub mod choices;
 mod document;
-pub mod environment;
 pub mod image;
 pub mod judge;
 mod own_scenes;
 mod pictures;
 pub mod query;
-pub mod ray_set;
 pub mod rays;
 pub mod spawn;
 pub mod spheres;
@@ -32,12 +30,12 @@ use crate::measure::oracle::Oracle;
 use crate::progress::Progress;
 use crate::render::Renderer;
 
+use crate::measure::environment::Environment;
+use crate::measure::ray_set::{Group, Question, RaySet};
 use accuracy::{Accuracy, AccuracyRow};
-use environment::Environment;
 use image::ImageRow;
 use judge::Judge;
 use query::{Effort, QueryRow};
-use ray_set::{Group, Question, RaySet};
 use rays::RayKind;
 use spawn::SpawnRow;
 use spheres::SphereRow;

@@ -4,9 +4,9 @@ use rayon::prelude::*;
 
 use super::choices::{Answers, Choice, Label};
 use super::judge::{Judge, Truth, Verdict};
-use super::ray_set::{Answered, Group, Question, RaySet};
 use crate::error::Result;
 use crate::geometry::{Hit, Ray};
+use crate::measure::ray_set::{Answered, Group, Question, RaySet};
 use crate::measure::speed::{interleaved, millions_per_second};
 use crate::measure::statistics::Median;
 use crate::measure::sweep::{Cost, Range, Rate, dominated};

@@ -2,11 +2,11 @@
 
 use glam::{DVec2, DVec3};
 
-use super::ray_set::{Group, Question, RaySet};
 use crate::error::Result;
 use crate::geometry::{Ray, TriangleMesh};
 use crate::math::random::Random;
 use crate::math::vector::{dot, length};
+use crate::measure::ray_set::{Group, Question, RaySet};
 use crate::progress::Progress;
 use crate::render::Renderer;
 use crate::render::surface::SurfacePoint;

@@ -5,13 +5,13 @@ use rayon::prelude::*;
 
 use super::accuracy::{Spread, angle};
 use super::query::Effort;
-use super::ray_set::Group;
 use super::rays::SEED;
 use crate::error::Result;
 use crate::geometry::{Ray, shapes};
 use crate::math::random::Random;
 use crate::math::vector::{basis, dot, length, normalize};
 use crate::measure::oracle::Oracle;
+use crate::measure::ray_set::Group;
 use crate::measure::scenes::ulp;
 use crate::measure::speed::interleaved;
 use crate::measure::statistics::Median;
