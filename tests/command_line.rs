@@ -425,7 +425,7 @@ fn every_shell_gets_completions() {
 fn info_is_readable_and_its_json_is_stable() {
     let workshop = Workshop::new();
     let readable = text(&workshop.succeed("info model.obj --tree"));
-    for part in ["triangles", "13", "floor", "cwbvh", "180 B", "auto (used)", "1.25"] {
+    for part in ["triangles", "13", "floor", "wide", "180 B", "auto (used)", "1.25"] {
         assert!(readable.contains(part), "{part}: {readable}");
     }
     let json: Value = serde_json::from_slice(&workshop.succeed("info model.obj --json")).unwrap();

@@ -102,7 +102,7 @@ fn the_leaks_of_a_closed_sphere_are_found_and_ours_has_none() {
         let hashes: BTreeSet<&str> = query.iter().filter(own).map(|row| row["hit_hash"].as_str().unwrap()).collect();
         assert_eq!(hashes.len(), 1, "the renderer's trees give one answer: {hashes:?}");
     }
-    assert!(page.contains("The default, cwbvh balanced, got 0 of 6000 rays wrong"), "{page}");
+    assert!(page.contains("The default, wide balanced, got 0 of 6000 rays wrong"), "{page}");
     // The exact solver's t is closest; what clamping and shear cost stays below the stated quantile.
     for row in rows(&report, "accuracy").iter().filter(|row| row["triangle_test"] == "Woop (ours)") {
         assert!(row["t_normalized"]["max"].as_f64().unwrap() < 8.0, "{row}");

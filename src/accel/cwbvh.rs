@@ -129,7 +129,7 @@ impl WideNode {
         for axis in 0..3 {
             let (origin, step) = (self.origin[axis], power_of_two(self.exponents[axis]));
             let [lower, upper] = &self.planes[axis];
-            let (entry, exit) = if ray.negative[axis] { (upper, lower) } else { (lower, upper) };
+            let (entry, exit) = if ray.is_negative(axis) { (upper, lower) } else { (lower, upper) };
             for child in 0..WIDTH {
                 let t_entry = (restore(origin, step, entry[child]) - ray.origin[axis]) * ray.inverse[axis];
                 near[child] = if t_entry > near[child] { t_entry } else { near[child] };

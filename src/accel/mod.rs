@@ -4,7 +4,8 @@
 //! ```text
 //! boxes -> Topology (ploc) -> PairTree -> Bvh2     (triangles of one mesh)
 //!                          |          `-> BoxTree  (instances)
-//!                          `-> CwBvh               (triangles of one mesh)
+//!                          |-> CwBvh               (triangles of one mesh)
+//!                          `-> Wide                (triangles of one mesh, SIMD chosen at run time)
 //! ```
 //!
 //! Why trees cannot disagree: a hit's t lies within the interval in which the ray crosses the triangle's own box, and
@@ -27,6 +28,7 @@ mod stats;
 mod tests;
 mod topology;
 mod triangle_tree;
+pub(crate) mod wide;
 
 pub use box_tree::BoxTree;
 pub use bvh2::Bvh2;
@@ -36,9 +38,10 @@ pub use stats::TreeStats;
 /// For `measure`, which compares formulas within one and the same tree.
 #[cfg(feature = "measure")]
 pub(crate) use topology::{Node, Topology};
+pub use wide::Wide;
 
 use crate::error::Result;
-use crate::geometry::{Bounds, Hit, Key, PreparedRay, TriangleMesh};
+use crate::geometry::{Bounds, Hit, Key, PreparedRay, Ray, TriangleMesh};
 use crate::progress::Progress;
 
 /// Calls the macro `$callback!` with `{ $arguments }` and then, per structure, `Type "name" "description";`.
@@ -52,6 +55,7 @@ macro_rules! for_each_accelerator {
             Linear "linear" "Every triangle, no tree: the reference.";
             Bvh2 "bvh2" "Binary tree.";
             CwBvh "cwbvh" "Compressed 8-wide tree: the least memory.";
+            Wide "wide" "8-wide tree searched with SIMD: the fastest.";
         }
     };
 }
@@ -118,7 +122,7 @@ for_each_accelerator!(define_kind {});
 impl Kind {
     /// The structure itself: `Auto` becomes the one that measures fastest.
     pub fn resolve(self) -> Self {
-        if self == Self::Auto { Self::CwBvh } else { self }
+        if self == Self::Auto { Self::Wide } else { self }
     }
 }
 
@@ -174,6 +178,22 @@ pub trait TriangleAccelerator: Sized + Send + Sync {
 
     /// Replaces `best` by the ray's first hit strictly after `key` if that comes before it.
     fn next_after(&self, ray: &PreparedRay, instance: u32, key: Key, best: &mut Hit);
+
+    /// The first hit of a ray in the structure's own space where that is the only object, number 0.
+    #[inline(always)]
+    fn closest_alone(&self, ray: &Ray) -> Hit {
+        let mut best = Hit::MISS;
+        if let Some(ray) = PreparedRay::new(ray) {
+            self.closest(&ray, 0, &mut best);
+        }
+        best
+    }
+
+    /// Whether a ray in the structure's own space hits anything.
+    #[inline(always)]
+    fn occluded_alone(&self, ray: &Ray) -> bool {
+        PreparedRay::new(ray).is_some_and(|ray| self.occluded(&ray))
+    }
 
     /// [`closest`](Self::closest) for each ray and the hit at the same position; the slices have equal lengths.
     fn closest_batch(&self, rays: &[PreparedRay], instance: u32, best: &mut [Hit]) {

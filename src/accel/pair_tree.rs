@@ -37,7 +37,7 @@ impl Pair {
         let (mut near, mut far) = ([near; 2], [far; 2]);
         for axis in 0..3 {
             let [lower, upper] = self.planes[axis];
-            let (entry, exit) = if ray.negative[axis] { (upper, lower) } else { (lower, upper) };
+            let (entry, exit) = if ray.is_negative(axis) { (upper, lower) } else { (lower, upper) };
             for child in 0..2 {
                 let t_entry = (entry[child] - ray.origin[axis]) * ray.inverse[axis];
                 let t_exit = (exit[child] - ray.origin[axis]) * ray.inverse_far[axis];

@@ -66,7 +66,7 @@ impl<T: TriangleTree> TriangleAccelerator for T {
     }
 
     fn closest(&self, ray: &PreparedRay, instance: u32, best: &mut Hit) {
-        let _ = self.traverse(ray, ray.lower_bound(ray.t_min), far_bound(ray, best), |triangles| {
+        let _ = self.traverse(ray, ray.lower_bound(ray.t_min), ray.far_bound(best.t), |triangles| {
             for triangle in triangles {
                 if let Some(hit) = triangle.intersect(ray, instance)
                     && hit.key().is_before(&best.key())
@@ -74,7 +74,7 @@ impl<T: TriangleTree> TriangleAccelerator for T {
                     *best = hit;
                 }
             }
-            ControlFlow::Continue(far_bound(ray, best))
+            ControlFlow::Continue(ray.far_bound(best.t))
         });
     }
 
@@ -89,7 +89,7 @@ impl<T: TriangleTree> TriangleAccelerator for T {
 
     fn next_after(&self, ray: &PreparedRay, instance: u32, key: Key, best: &mut Hit) {
         let near = ray.lower_bound(ray.t_min).max(ray.lower_bound(key.t));
-        let _ = self.traverse(ray, near, far_bound(ray, best), |triangles| {
+        let _ = self.traverse(ray, near, ray.far_bound(best.t), |triangles| {
             for triangle in triangles {
                 if let Some(hit) = triangle.intersect(ray, instance)
                     && key.is_before(&hit.key())
@@ -98,7 +98,7 @@ impl<T: TriangleTree> TriangleAccelerator for T {
                     *best = hit;
                 }
             }
-            ControlFlow::Continue(far_bound(ray, best))
+            ControlFlow::Continue(ray.far_bound(best.t))
         });
     }
 
@@ -114,11 +114,4 @@ impl<T: TriangleTree> TriangleAccelerator for T {
     fn bounds(&self) -> Bounds {
         TriangleTree::bounds(self)
     }
-}
-
-/// The largest t in the mesh's space at which a hit can still count: within the ray and no later than `best`.
-#[inline(always)]
-fn far_bound(ray: &PreparedRay, best: &Hit) -> f32 {
-    let (within, best) = (ray.upper_bound(ray.t_max), ray.upper_bound(best.t));
-    if best < within { best } else { within }
 }

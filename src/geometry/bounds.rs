@@ -103,7 +103,7 @@ impl Bounds {
         let (mut near, mut far) = (near, far);
         for axis in 0..3 {
             let (entry, exit) =
-                if ray.negative[axis] { (self.max[axis], self.min[axis]) } else { (self.min[axis], self.max[axis]) };
+                if ray.is_negative(axis) { (self.max[axis], self.min[axis]) } else { (self.min[axis], self.max[axis]) };
             let t_entry = (entry - ray.origin[axis]) * ray.inverse[axis];
             let t_exit = (exit - ray.origin[axis]) * ray.inverse_far[axis];
             near = if t_entry > near { t_entry } else { near };

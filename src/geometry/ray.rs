@@ -1,7 +1,7 @@
 //! Rays, and what is computed once per ray before it meets boxes and triangles.
 
 use bytemuck::{Pod, Zeroable};
-use glam::Vec3;
+use glam::{Vec3, Vec3A, Vec4};
 
 /// A ray: the points `origin + t direction` for t in the closed interval `[t_min, t_max]`.
 ///
@@ -29,13 +29,18 @@ impl Ray {
     }
 
     /// Whether the ray can meet anything at all; see the type.
-    #[inline]
+    #[inline(always)]
     pub fn is_valid(&self) -> bool {
-        self.origin.is_finite()
-            && self.direction.is_finite()
-            && self.direction != Vec3::ZERO
-            && self.t_min <= self.t_max
-            && self.t_max >= 0.0
+        let [start, way] = self.halves();
+        let finite = |v: Vec4| v.abs().cmple(Vec4::splat(f32::MAX)).bitmask();
+        let nonzero = way.cmpne(Vec4::ZERO).bitmask() & 7;
+        (finite(start) & finite(way) & 7 == 7) & (nonzero != 0) & (self.t_min <= self.t_max) & (self.t_max >= 0.0)
+    }
+
+    /// Origin and `t_min`, direction and `t_max`, as they lie in memory.
+    #[inline(always)]
+    fn halves(&self) -> [Vec4; 2] {
+        bytemuck::cast(*self)
     }
 }
 
@@ -70,19 +75,19 @@ impl Interval {
 #[derive(Debug, Clone, Copy)]
 pub struct PreparedRay {
     /// Where the ray starts.
-    pub origin: Vec3,
+    pub origin: Vec3A,
     /// Where it goes.
-    pub direction: Vec3,
+    pub direction: Vec3A,
     /// 1 / direction per axis, not clamped: infinite, with the sign of the zero, where the direction is 0.
-    pub inverse: Vec3,
+    pub inverse: Vec3A,
     /// `inverse` made [`PADDING`] ulp larger in magnitude, for the far planes of boxes.
-    pub inverse_far: Vec3,
-    /// Whether the direction's sign bit is set, per axis: then a box is entered through its upper plane.
-    pub negative: [bool; 3],
+    pub inverse_far: Vec3A,
+    /// Woop's shear: `d[axes[0]] / d[axes[2]]`, `d[axes[1]] / d[axes[2]]`, `1 / d[axes[2]]`.
+    pub shear: Vec3A,
     /// Woop's axis order: `axes[2]` is the direction's largest component.
     pub axes: [usize; 3],
-    /// Woop's shear: `d[axes[0]] / d[axes[2]]`, `d[axes[1]] / d[axes[2]]`, `1 / d[axes[2]]`.
-    pub shear: Vec3,
+    /// A bit an axis: whether the direction's sign bit is set. Then a box is entered through its upper plane.
+    pub signs: u32,
     /// The smallest t that counts, at least 0.
     pub t_min: f32,
     /// The largest t that counts.
@@ -94,45 +99,54 @@ pub struct PreparedRay {
 
 impl PreparedRay {
     /// Prepares a ray in world space; `None` if it can meet nothing.
-    #[inline]
+    #[inline(always)]
     pub fn new(ray: &Ray) -> Option<Self> {
-        ray.is_valid().then(|| Self::with_clip(ray.origin, ray.direction, ray.t_min, ray.t_max, Interval::ALL))
+        let [origin, direction] = ray.halves().map(Vec3A::from_vec4);
+        ray.is_valid().then(|| Self::with_clip(origin, direction, ray.t_min, ray.t_max, Interval::ALL))
     }
 
     /// Prepares a ray that was brought into an instance's space; `None` if rounding left it without a direction.
     #[inline]
     pub fn local(origin: Vec3, direction: Vec3, world: &Self, clip: Interval) -> Option<Self> {
         (origin.is_finite() && direction.is_finite() && direction != Vec3::ZERO)
-            .then(|| Self::with_clip(origin, direction, world.t_min, world.t_max, clip))
+            .then(|| Self::with_clip(origin.into(), direction.into(), world.t_min, world.t_max, clip))
     }
 
-    #[inline]
-    fn with_clip(origin: Vec3, direction: Vec3, t_min: f32, t_max: f32, clip: Interval) -> Self {
-        let inverse = Vec3::ONE / direction;
-        let magnitude = direction.abs();
-        // The largest component becomes z. Woop et al. swap x and y for negative z to keep the winding; both sides
-        // count here, so the order stays cyclic and only the sign of the determinant changes.
-        let z = if magnitude.x > magnitude.y {
-            if magnitude.x > magnitude.z { 0 } else { 2 }
-        } else if magnitude.y > magnitude.z {
-            1
-        } else {
-            2
-        };
-        let axes = [(z + 1) % 3, (z + 2) % 3, z];
-        let along = direction[z];
+    #[inline(always)]
+    fn with_clip(origin: Vec3A, direction: Vec3A, t_min: f32, t_max: f32, clip: Interval) -> Self {
+        let inverse = Vec3A::ONE / direction;
+        let [x, y, z] = direction.abs().to_array();
+        // The largest component becomes z, without branches, which random directions would mislead. Woop et al. swap x and
+        // y for negative z to keep the winding; both sides count here, so the order stays cyclic and only the sign of the
+        // determinant changes.
+        let larger = if x > y { x } else { y };
+        let largest = if larger > z { usize::from(x <= y) } else { 2 };
+        let axes = AXES[largest];
+        let d = direction.to_array();
         Self {
             origin,
             direction,
             inverse,
-            inverse_far: Vec3::new(padded(inverse.x), padded(inverse.y), padded(inverse.z)),
-            negative: [direction.x, direction.y, direction.z].map(f32::is_sign_negative),
+            inverse_far: padded(inverse),
+            shear: Vec3A::new(d[axes[0]], d[axes[1]], 1.0) / Vec3A::splat(d[largest]),
             axes,
-            shear: Vec3::new(direction[axes[0]] / along, direction[axes[1]] / along, 1.0 / along),
+            signs: direction.is_negative_bitmask(),
             t_min: if t_min > 0.0 { t_min } else { 0.0 },
             t_max,
             clip,
         }
+    }
+
+    /// Whether the direction's sign bit is set along an axis: then a box is entered through its upper plane.
+    #[inline(always)]
+    pub fn is_negative(&self, axis: usize) -> bool {
+        self.signs >> axis & 1 != 0
+    }
+
+    /// Whether nothing before the origin can be clamped to where it counts.
+    #[inline(always)]
+    pub fn starts_at_origin(&self) -> bool {
+        !(self.clip.near >= 0.0)
     }
 
     /// The smallest t at which something in this space can still give a hit at or after `t`, clamping considered.
@@ -149,6 +163,13 @@ impl PreparedRay {
     pub fn upper_bound(&self, t: f32) -> f32 {
         if self.clip.far <= t { f32::INFINITY } else { t }
     }
+
+    /// The largest t in this space at which a hit can still count: within the ray and no later than `best`.
+    #[inline(always)]
+    pub fn far_bound(&self, best: f32) -> f32 {
+        let (within, best) = (self.upper_bound(self.t_max), self.upper_bound(best));
+        if best < within { best } else { within }
+    }
 }
 
 /// By how many ulp the far planes of boxes are padded.
@@ -160,14 +181,20 @@ impl PreparedRay {
 /// [`hit_bounds`](crate::geometry::triangle::hit_bounds).
 pub const PADDING: u32 = 12;
 
-/// The value [`PADDING`] ulp farther from zero; infinities stay.
+/// The values [`PADDING`] ulp farther from zero; infinities stay.
 #[inline(always)]
-fn padded(x: f32) -> f32 {
+fn padded(v: Vec3A) -> Vec3A {
     const INFINITY_BITS: u32 = f32::INFINITY.to_bits();
-    let sign = x.to_bits() & 0x8000_0000;
-    let magnitude = (x.to_bits() & 0x7fff_ffff) + PADDING;
-    f32::from_bits(sign | if magnitude < INFINITY_BITS { magnitude } else { INFINITY_BITS })
+    let farther = |x: f32| {
+        let sign = x.to_bits() & 0x8000_0000;
+        let magnitude = (x.to_bits() & 0x7fff_ffff) + PADDING;
+        f32::from_bits(sign | if magnitude < INFINITY_BITS { magnitude } else { INFINITY_BITS })
+    };
+    Vec3A::from_array(v.to_array().map(farther))
 }
+
+/// The cyclic orders of axes by their last one.
+const AXES: [[usize; 3]; 3] = [[1, 2, 0], [2, 0, 1], [0, 1, 2]];
 
 #[cfg(test)]
 mod tests {
@@ -193,6 +220,7 @@ mod tests {
 
     #[test]
     fn the_padded_inverse_is_farther_out_and_keeps_infinities() {
+        let padded = |x: f32| padded(Vec3A::splat(x)).x;
         assert_eq!(padded(1.0), 1.0 + 12.0 * f32::EPSILON);
         assert_eq!(padded(-1.0), -1.0 - 12.0 * f32::EPSILON);
         assert_eq!(padded(f32::INFINITY), f32::INFINITY);

@@ -9,10 +9,10 @@
 //! - t is clamped into the interval in which the ray crosses the triangle's own f32 box ([`hit_bounds`]), so that no tree can
 //!   cull a hit.
 
-use glam::Vec3;
+use glam::{Vec3, Vec3A};
 
 use crate::geometry::bounds::Bounds;
-use crate::geometry::ray::PreparedRay;
+use crate::geometry::ray::{Interval, PreparedRay};
 use crate::math::float::UNIT_ROUNDOFF;
 
 /// Where a ray meets a triangle: the point is `(1 - u - v) A + u B + v C`.
@@ -38,40 +38,62 @@ pub fn intersect_triangle(ray: &PreparedRay, a: Vec3, b: Vec3, c: Vec3) -> Optio
     let (sx, sy) = (ray.shear.x, ray.shear.y);
 
     // Move the origin to zero and shear the ray onto the z axis: the question becomes two-dimensional.
-    let [a_rel, b_rel, c_rel] = [a, b, c].map(|p| (p - ray.origin).to_array());
-    let (ax, ay) = (a_rel[kx] - sx * a_rel[kz], a_rel[ky] - sy * a_rel[kz]);
-    let (bx, by) = (b_rel[kx] - sx * b_rel[kz], b_rel[ky] - sy * b_rel[kz]);
-    let (cx, cy) = (c_rel[kx] - sx * c_rel[kz], c_rel[ky] - sy * c_rel[kz]);
+    let corners = [a, b, c].map(Vec3A::from);
+    let [a_rel, b_rel, c_rel] = corners.map(|p| (p - ray.origin).to_array());
+    let sheared = Sheared {
+        x: [a_rel, b_rel, c_rel].map(|p| p[kx] - sx * p[kz]),
+        y: [a_rel, b_rel, c_rel].map(|p| p[ky] - sy * p[kz]),
+        z: [a_rel, b_rel, c_rel].map(|p| p[kz]),
+    };
 
     // On which side of each edge does the ray pass? Two rounded products, never fused. Rounding is monotone: a sign may
     // become 0, never the opposite, so that triangles with both signs are missed. NaN, after an overflow, decides nothing.
+    let ([ax, bx, cx], [ay, by, cy]) = (sheared.x, sheared.y);
     let weight_a = cx * by - cy * bx;
     let weight_b = ax * cy - ay * cx;
     let weight_c = bx * ay - by * ax;
     if both_signs(weight_a, weight_b, weight_c) {
         return None;
     }
+    decide(ray, corners, &sheared)
+}
 
-    // The same without rounding in the products. Each sign is that of the exact edge function, so that swapping the ends
-    // of an edge flips it: what lies on one side of an edge for one triangle lies on the other for its neighbour.
-    let [ax, ay, az, bx, by, bz, cx, cy, cz] = [ax, ay, a_rel[kz], bx, by, b_rel[kz], cx, cy, c_rel[kz]].map(f64::from);
+/// The corners A, B and C of a triangle where the ray's origin is zero and the ray runs along z; `z` is not sheared, but
+/// along the ray's largest axis.
+#[derive(Debug, Clone, Copy)]
+pub struct Sheared {
+    /// Beside the ray.
+    pub x: [f32; 3],
+    /// Beside the ray.
+    pub y: [f32; 3],
+    /// Along the ray's largest axis.
+    pub z: [f32; 3],
+}
+
+/// What follows the signs in f32, for triangles that these do not sort out; those that they do this sorts out as well.
+#[inline(always)]
+pub fn decide(ray: &PreparedRay, corners: [Vec3A; 3], sheared: &Sheared) -> Option<TriangleHit> {
+    // The edge functions without rounding in the products. Each sign is that of the exact edge function, so that swapping
+    // the ends of an edge flips it: what lies on one side of an edge for one triangle lies on the other for its neighbour.
+    let ([ax, bx, cx], [ay, by, cy]) = (sheared.x.map(f64::from), sheared.y.map(f64::from));
     let weight_a = cx * by - cy * bx;
     let weight_b = ax * cy - ay * cx;
     let weight_c = bx * ay - by * ax;
-    if both_signs(weight_a, weight_b, weight_c) {
-        return None;
-    }
+    let least = lesser(lesser(weight_a, weight_b), weight_c);
+    let most = greater(greater(weight_a, weight_b), weight_c);
     let determinant = weight_a + weight_b + weight_c;
-    if !(determinant.abs() > 0.0 && determinant.abs() < f64::INFINITY) {
+    if ((least < 0.0) & (most > 0.0)) | !((determinant != 0.0) & (determinant.abs() < f64::INFINITY)) {
         return None;
     }
 
     // The distance is the weighted mean of the vertices' distances along the ray.
-    let along = f64::from(ray.direction[kz]);
+    let [az, bz, cz] = sheared.z.map(f64::from);
+    let along = f64::from(ray.direction[ray.axes[2]]);
     let t = ((weight_a * az + weight_b * bz + weight_c * cz) / (determinant * along)) as f32;
 
     // Keep t where the ray crosses the triangle's box, then where it crosses the instance's.
-    let own = hit_bounds([a, b, c]).interval(ray, f32::NEG_INFINITY, f32::INFINITY);
+    let [min, max] = hit_corners(corners);
+    let own = interval(ray, min, max);
     if own.is_empty() {
         return None;
     }
@@ -81,6 +103,31 @@ pub fn intersect_triangle(ray: &PreparedRay, a: Vec3, b: Vec3, c: Vec3) -> Optio
     }
     let share = |weight: f64| (weight / determinant) as f32 + 0.0;
     Some(TriangleHit { t, u: share(weight_b), v: share(weight_c) })
+}
+
+/// [`Bounds::interval`] of the whole ray, axes side by side; zeros may have another sign.
+#[inline(always)]
+fn interval(ray: &PreparedRay, min: Vec3A, max: Vec3A) -> Interval {
+    // By the sign bit: -0 counts as negative.
+    let negative = Vec3A::ONE.copysign(ray.direction).cmplt(Vec3A::ZERO);
+    let entry = (Vec3A::select(negative, max, min) - ray.origin) * ray.inverse;
+    let exit = (Vec3A::select(negative, min, max) - ray.origin) * ray.inverse_far;
+    Interval {
+        near: entry.to_array().into_iter().fold(f32::NEG_INFINITY, |near, t| greater(t, near)),
+        far: exit.to_array().into_iter().fold(f32::INFINITY, |far, t| lesser(t, far)),
+    }
+}
+
+/// a if it is greater, else b: b where either is NaN.
+#[inline(always)]
+fn greater<T: PartialOrd>(a: T, b: T) -> T {
+    if a > b { a } else { b }
+}
+
+/// a if it is less, else b: b where either is NaN.
+#[inline(always)]
+fn lesser<T: PartialOrd>(a: T, b: T) -> T {
+    if a < b { a } else { b }
 }
 
 /// The box in which the test looks for hits on a triangle: its own, made larger along axes along which it is not flat by
@@ -95,20 +142,25 @@ pub fn intersect_triangle(ray: &PreparedRay, a: Vec3, b: Vec3, c: Vec3) -> Optio
 /// more than the other axes were enlarged by, and stays flat: axis-aligned walls keep their exact place.
 #[inline(always)]
 pub fn hit_bounds(corners: [Vec3; 3]) -> Bounds {
-    let Bounds { min, max } = Bounds::of(corners);
+    let [min, max] = hit_corners(corners.map(Vec3A::from));
+    Bounds { min: min.into(), max: max.into() }
+}
+
+#[inline(always)]
+fn hit_corners([a, b, c]: [Vec3A; 3]) -> [Vec3A; 2] {
+    let (min, max) = (a.min(b).min(c), a.max(b).max(c));
     let extent = max - min;
     let largest = if extent.x > extent.y { extent.x } else { extent.y };
     let largest = if extent.z > largest { extent.z } else { largest };
-    let margin = largest * (8.0 * UNIT_ROUNDOFF as f32);
-    let grow = |axis: usize| {
-        if extent[axis] == 0.0 {
-            return (min[axis], max[axis]);
-        }
-        // One step farther covers the rounding of the sum and, where that is coarse, the margin itself.
-        ((min[axis] - margin).next_down(), (max[axis] + margin).next_up())
-    };
-    let [x, y, z] = [grow(0), grow(1), grow(2)];
-    Bounds { min: Vec3::new(x.0, y.0, z.0), max: Vec3::new(x.1, y.1, z.1) }
+    // The rounding of the sum is at most u of the coordinate: 1.5 u of it beside the margin cover that and, where the margin
+    // is finer than the coordinates, make a step. The least numbers stand in for both where they underflow.
+    let margin = Vec3A::splat(largest * (8.0 * UNIT_ROUNDOFF as f32) + f32::from_bits(8));
+    let step = Vec3A::splat(1.5 * UNIT_ROUNDOFF as f32);
+    let flat = extent.cmpeq(Vec3A::ZERO);
+    [
+        Vec3A::select(flat, min, min - (margin + min.abs() * step)),
+        Vec3A::select(flat, max, max + (margin + max.abs() * step)),
+    ]
 }
 
 /// Whether some of the three are negative and some positive.
@@ -211,7 +263,7 @@ mod tests {
         let flat = hit_bounds([A, B, C]);
         assert_eq!((flat.min.z, flat.max.z), (2.0, 2.0));
         let margin = 8.0 * UNIT_ROUNDOFF as f32;
-        assert!(flat.min.x < -margin && flat.min.x > -1.01 * margin);
+        assert!(flat.min.x <= -margin && flat.min.x > -1.01 * margin);
         assert!(flat.max.y > 1.0 && flat.max.y < 1.0 + 2.0 * margin);
         // Far from zero a margin finer than the coordinates is a step of them.
         let far = hit_bounds([A, B, C].map(|p| p + Vec3::X * 1e6));

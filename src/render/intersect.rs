@@ -277,11 +277,19 @@ impl<A: TriangleAccelerator> TwoLevel<A> {
 }
 
 impl<A: TriangleAccelerator> Intersect for TwoLevel<A> {
+    #[inline(always)]
     fn closest(&self, ray: &Ray) -> Hit {
+        if let Top::Single = self.top {
+            return self.meshes[0].closest_alone(ray);
+        }
         PreparedRay::new(ray).map_or(Hit::MISS, |ray| self.search::<Everything>(&ray, None))
     }
 
+    #[inline(always)]
     fn occluded(&self, ray: &Ray) -> bool {
+        if let Top::Single = self.top {
+            return self.meshes[0].occluded_alone(ray);
+        }
         PreparedRay::new(ray).is_some_and(|ray| self.any::<Everything>(&ray))
     }
 

@@ -67,7 +67,7 @@ pub fn prepare(rays: &[Ray], random: &mut Random) -> Vec<PreparedRay> {
             4 => Interval { near: ray.t_min, far: ray.t_min + b },
             _ => Interval { near: a, far: a + b },
         };
-        prepared[number] = PreparedRay::local(ray.origin, ray.direction, &ray, clip).unwrap();
+        prepared[number] = PreparedRay::local(ray.origin.into(), ray.direction.into(), &ray, clip).unwrap();
     }
     prepared
 }

@@ -46,7 +46,7 @@ fn pairs_cross_their_boxes_as_single_boxes_do() {
                 0 => Bounds::of([random.vector(), random.vector()]),
                 1 => Bounds::of([hard(&mut random), random.vector()]),
                 // The ray's own origin, so that planes go through it; flat along some axes.
-                2 => Bounds::of([ray.origin, hard(&mut random)]),
+                2 => Bounds::of([ray.origin.into(), hard(&mut random)]),
                 // Without end, or nothing at all.
                 3 => Bounds { min: Vec3::NEG_INFINITY, max: hard(&mut random) },
                 _ => [Bounds::EMPTY, Bounds { min: Vec3::NAN, max: Vec3::NAN }][random.below(2)],
@@ -73,8 +73,8 @@ fn wide_nodes_cross_their_quantised_boxes_as_single_boxes_do() {
         let boxes: Vec<Bounds> = (0..WIDTH)
             .map(|child| match (round + child) % 3 {
                 0 => Bounds::of([random.vector(), random.vector()]),
-                1 => Bounds::of([ray.origin, random.vector()]),
-                _ => Bounds::of([hard(&mut random).clamp(Vec3::splat(-1e30), Vec3::splat(1e30)), ray.origin]),
+                1 => Bounds::of([ray.origin.into(), random.vector()]),
+                _ => Bounds::of([hard(&mut random).clamp(Vec3::splat(-1e30), Vec3::splat(1e30)), ray.origin.into()]),
             })
             .take(if round % 2 == 0 { WIDTH } else { 2 })
             .collect();

@@ -236,7 +236,7 @@ impl TriangleBounds {
 /// The bounds for a ray and a triangle of an instance, whose exact t is given if the line passes it.
 pub fn triangle(ray: &Ray, instance: &Instance, corners: [Vec3; 3], t: Option<f64>) -> TriangleBounds {
     let rounded = PreparedRay::new(ray).and_then(|ray| instance.local_ray(&ray, Interval::ALL));
-    let Some(rounded) = rounded.filter(|local| is_usual(ray.direction) && is_usual(local.direction)) else {
+    let Some(rounded) = rounded.filter(|local| is_usual(ray.direction) && is_usual(local.direction.into())) else {
         return TriangleBounds::NONE;
     };
     let line = local(ray, instance);

@@ -167,7 +167,7 @@ fn the_plain_box_test_loses_rays_at_the_edges_of_boxes_and_the_padded_ones_do_no
 #[test]
 fn the_published_padding_is_two_ulp() {
     let far = Ize::ray(&Ray::new(Vec3::ZERO, Vec3::new(1.0, -2.0, 0.0))).inverse_far;
-    assert_eq!(far, Vec3::new(1.0 + 2.0 * f32::EPSILON, -0.5 - f32::EPSILON, f32::INFINITY));
+    assert_eq!(far, glam::Vec3A::new(1.0 + 2.0 * f32::EPSILON, -0.5 - f32::EPSILON, f32::INFINITY));
 }
 
 #[test]

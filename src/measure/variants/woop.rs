@@ -145,7 +145,7 @@ impl<E: EdgeFunction> TriangleTest for Woop<E> {
     fn intersect(ray: &PreparedRay, corners: &[Vec3; 3]) -> Option<TriangleHit> {
         let [kx, ky, kz] = ray.axes;
         let (sx, sy, sz) = (ray.shear.x, ray.shear.y, ray.shear.z);
-        let relative = corners.map(|p| (p - ray.origin).to_array());
+        let relative = corners.map(|p| (p - Vec3::from(ray.origin)).to_array());
         let [[ax, ay], [bx, by], [cx, cy]] = relative.map(|p| [p[kx] - sx * p[kz], p[ky] - sy * p[kz]]);
 
         let [u, v, w] = E::evaluate([[cx, by, cy, bx], [ax, cy, ay, cx], [bx, ay, by, ax]]);

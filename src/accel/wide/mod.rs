@@ -1,0 +1,181 @@
+//! The fastest structure: an 8-wide tree with exact boxes, leaves of up to 8 triangles met at once, and SIMD chosen at run
+//! time.
+//!
+//! ```text
+//! Topology (ploc) -> Collapse -> Node, Leaves -> Tree -> simd::{single}
+//! ```
+
+mod collapse;
+mod leaf;
+mod node;
+pub mod simd;
+#[cfg(test)]
+mod tests;
+
+use collapse::{Collapse, MOST_DEPTH};
+use leaf::Leaves;
+use node::{Child, Node};
+use simd::{Closest, Level, NextAfter, Occluded};
+
+use super::leaf::{LeafTriangle, check_distinct, check_partition};
+use super::topology::{Topology, half_area};
+use super::{Params, TreeStats, TriangleAccelerator};
+use crate::error::{Error, Result};
+use crate::geometry::triangle::hit_bounds;
+use crate::geometry::{Bounds, Hit, Key, PreparedRay, Ray, TriangleMesh};
+use crate::progress::{Progress, Share};
+
+/// Nodes and leaves. Only ever made by [`Collapse`], or by tests that checked them, so that children are in range.
+#[derive(Debug)]
+pub struct Tree {
+    nodes: Vec<Node>,
+    leaves: Leaves,
+    root: Child,
+}
+
+/// An 8-wide tree with exact boxes.
+pub struct Wide {
+    tree: Tree,
+    bounds: Bounds,
+    level: Level,
+}
+
+impl Wide {
+    /// The same tree searched with another instruction set.
+    #[cfg(test)]
+    fn with_level(mut self, level: Level) -> Self {
+        self.level = level;
+        self
+    }
+}
+
+impl TriangleAccelerator for Wide {
+    const NAME: &'static str = "wide";
+
+    fn build(mesh: &TriangleMesh, params: &Params, progress: &dyn Progress) -> Result<Self> {
+        progress.check()?;
+        if mesh.live_count() >= Child::MOST {
+            let message =
+                format!("mesh `{}` has {} triangles; a wide tree holds {}", mesh.name, mesh.live_count(), Child::MOST);
+            return Err(Error::limit(message));
+        }
+        let mut share = Share::new(progress, mesh.live_count() as u64);
+        let live: Vec<u32> = mesh.live_triangles().collect();
+        let boxes: Vec<Bounds> = live.iter().map(|&number| hit_bounds(mesh.triangle(number))).collect();
+        let topology = Topology::build(&boxes, params.preset, 1, &mut share)?;
+        drop(boxes);
+        let triangles: Vec<_> = topology.order.iter().map(|&at| LeafTriangle::new(mesh, live[at as usize])).collect();
+        let mut collapse = Collapse::new(&topology, &triangles);
+        let root = collapse.run();
+        let bounds = topology.nodes.first().map_or(Bounds::EMPTY, |root| root.bounds);
+        let tree = Tree { nodes: collapse.nodes, leaves: collapse.leaves, root };
+        share.reach(100)?;
+        let wide = Self { tree, bounds, level: Level::chosen() };
+        debug_assert_eq!(wide.validate(), Ok(()), "{}", Self::NAME);
+        Ok(wide)
+    }
+
+    #[inline(always)]
+    fn closest(&self, ray: &PreparedRay, instance: u32, best: &mut Hit) {
+        simd::search(self.level, &self.tree, ray, &mut Closest { instance, best });
+    }
+
+    #[inline(always)]
+    fn closest_alone(&self, ray: &Ray) -> Hit {
+        let mut best = Hit::MISS;
+        simd::search_alone(self.level, &self.tree, ray, &mut Closest { instance: 0, best: &mut best });
+        best
+    }
+
+    #[inline(always)]
+    fn occluded_alone(&self, ray: &Ray) -> bool {
+        let mut query = Occluded { found: false };
+        simd::search_alone(self.level, &self.tree, ray, &mut query);
+        query.found
+    }
+
+    #[inline(always)]
+    fn occluded(&self, ray: &PreparedRay) -> bool {
+        let mut query = Occluded { found: false };
+        simd::search(self.level, &self.tree, ray, &mut query);
+        query.found
+    }
+
+    fn next_after(&self, ray: &PreparedRay, instance: u32, key: Key, best: &mut Hit) {
+        simd::search(self.level, &self.tree, ray, &mut NextAfter { key, closest: Closest { instance, best } });
+    }
+
+    fn stats(&self) -> TreeStats {
+        let area = half_area(&self.bounds);
+        let relative = |bounds: &Bounds| if area > 0.0 { half_area(bounds) / area } else { 1.0 };
+        let mut stats = TreeStats {
+            triangles: self.tree.leaves.len() as u64,
+            nodes: self.tree.nodes.len() as u64,
+            node_bytes: size_of_val(self.tree.nodes.as_slice()) as u64,
+            leaf_bytes: size_of_val(self.tree.leaves.words()) as u64,
+            sah_cost: if self.tree.nodes.is_empty() { 0.0 } else { 1.0 },
+            ..TreeStats::default()
+        };
+        let mut pending = vec![(self.tree.root, self.bounds, 0)];
+        while let Some((child, bounds, depth)) = pending.pop() {
+            if child == Child::NONE {
+                continue;
+            }
+            if child.is_leaf() {
+                stats.leaves += 1;
+                stats.sah_cost += relative(&bounds) * child.count() as f64;
+                continue;
+            }
+            stats.sah_cost += if depth > 0 { relative(&bounds) } else { 0.0 };
+            stats.max_depth = stats.max_depth.max(depth + 1);
+            let node = &self.tree.nodes[child.number()];
+            pending.extend(node.children().map(|(child, bounds)| (child, bounds, depth + 1)));
+        }
+        stats
+    }
+
+    fn validate(&self) -> std::result::Result<(), String> {
+        let mut triangles = Vec::with_capacity(self.tree.leaves.len());
+        let mut leaves = Vec::new();
+        let mut parents = vec![0u32; self.tree.nodes.len()];
+        let mut pending = vec![(self.tree.root, self.bounds, 0)];
+        while let Some((child, bounds, depth)) = pending.pop() {
+            if child == Child::NONE {
+                continue;
+            }
+            if child.is_leaf() {
+                leaves.push((child.first() as u32, child.count() as u32));
+                if child.first() + child.count() > self.tree.leaves.len() {
+                    return Err(format!("the leaf at {} is out of range", child.first()));
+                }
+                for triangle in self.tree.leaves.triangles(child.first(), child.count()) {
+                    if !bounds.contains(&triangle.bounds()) {
+                        return Err(format!("the box around triangle {} is too small", triangle.primitive));
+                    }
+                    triangles.push(triangle);
+                }
+                continue;
+            }
+            let Some(node) = self.tree.nodes.get(child.number()) else {
+                return Err(format!("node {} is out of range", child.number()));
+            };
+            parents[child.number()] += 1;
+            if depth >= MOST_DEPTH || parents[child.number()] > 1 {
+                return Err(format!("node {} at depth {depth} is too deep or has two parents", child.number()));
+            }
+            if let Some((_, inner)) = node.children().find(|(_, inner)| !bounds.contains(inner)) {
+                return Err(format!("node {} has a child {inner:?} beyond its box {bounds:?}", child.number()));
+            }
+            pending.extend(node.children().map(|(child, bounds)| (child, bounds, depth + 1)));
+        }
+        if parents.contains(&0) {
+            return Err("a node has no parent".into());
+        }
+        check_partition(&mut leaves, self.tree.leaves.len())?;
+        check_distinct(&triangles)
+    }
+
+    fn bounds(&self) -> Bounds {
+        self.bounds
+    }
+}

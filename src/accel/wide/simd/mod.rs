@@ -1,0 +1,118 @@
+//! Eight numbers at a time: the instruction sets, chosen at run time, and the searches written for all of them.
+//!
+//! Every set gives the same bits: no operation here is fused, and comparisons with NaN come out as in [`Portable`], which is
+//! the scalar twin of the others. This is the one place of the accelerators with `unsafe` code: searches read nodes and
+//! leaves without checks, and instructions are used that not every processor has. What makes it sound: a [`Level`] is only
+//! ever one that the processor has, and [`Tree`](super::Tree) is only made of nodes whose children are in range.
+#![allow(unsafe_code)]
+
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
+mod portable;
+mod single;
+
+pub use single::{Closest, NextAfter, Occluded, search, search_alone};
+
+use std::sync::OnceLock;
+
+use portable::Portable;
+use single::Query;
+
+use super::node::Child;
+use crate::geometry::PreparedRay;
+
+/// The environment variable that forces an instruction set: `portable`, `avx2` or `avx512`.
+pub const VARIABLE: &str = "WHITTED_SIMD";
+
+/// An instruction set that this processor has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Level(Set);
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Set {
+    Portable,
+    #[cfg(target_arch = "x86_64")]
+    Avx2,
+    #[cfg(target_arch = "x86_64")]
+    Avx512,
+}
+
+impl Level {
+    /// What any processor can do.
+    pub const PORTABLE: Self = Self(Set::Portable);
+
+    /// Every set that this processor has, the best last.
+    pub fn available() -> impl Iterator<Item = Self> {
+        let sets = [
+            Some(Set::Portable),
+            #[cfg(target_arch = "x86_64")]
+            (is_x86_feature_detected!("avx2") && is_x86_feature_detected!("bmi1")).then_some(Set::Avx2),
+            #[cfg(target_arch = "x86_64")]
+            (is_x86_feature_detected!("avx512f")
+                && is_x86_feature_detected!("avx512vl")
+                && is_x86_feature_detected!("avx512dq")
+                && is_x86_feature_detected!("bmi1"))
+            .then_some(Set::Avx512),
+        ];
+        sets.into_iter().flatten().map(Self)
+    }
+
+    /// The set named by [`VARIABLE`] if this processor has it, else the best. Looked up once.
+    pub fn chosen() -> Self {
+        static CHOSEN: OnceLock<Level> = OnceLock::new();
+        *CHOSEN.get_or_init(|| {
+            let wanted = std::env::var(VARIABLE).unwrap_or_default();
+            let named = Self::available().find(|level| level.name() == wanted);
+            named.or(Self::available().last()).unwrap_or(Self::PORTABLE)
+        })
+    }
+
+    /// What the set is called in reports and in [`VARIABLE`].
+    pub fn name(self) -> &'static str {
+        match self.0 {
+            Set::Portable => "portable",
+            #[cfg(target_arch = "x86_64")]
+            Set::Avx2 => "avx2",
+            #[cfg(target_arch = "x86_64")]
+            Set::Avx512 => "avx512",
+        }
+    }
+}
+
+/// Eight f32 and what searches do with them.
+///
+/// # Safety
+/// All functions require the processor to have the instruction set, and pointers to point to eight readable (or
+/// writable) numbers.
+trait Lanes {
+    /// Eight numbers.
+    type Vector: Copy;
+
+    /// The same number eight times.
+    unsafe fn splat(x: f32) -> Self::Vector;
+    /// Eight numbers from memory, however aligned.
+    unsafe fn load(from: *const f32) -> Self::Vector;
+    /// Eight numbers to memory, however aligned.
+    unsafe fn store(to: *mut f32, v: Self::Vector);
+    /// `a - b`
+    unsafe fn sub(a: Self::Vector, b: Self::Vector) -> Self::Vector;
+    /// `a b`
+    unsafe fn mul(a: Self::Vector, b: Self::Vector) -> Self::Vector;
+    /// `a + b`
+    unsafe fn add(a: Self::Vector, b: Self::Vector) -> Self::Vector;
+    /// Without the sign.
+    unsafe fn abs(a: Self::Vector) -> Self::Vector;
+    /// `if a > b { a } else { b }`: b where either is NaN.
+    unsafe fn greater(a: Self::Vector, b: Self::Vector) -> Self::Vector;
+    /// `if a < b { a } else { b }`: b where either is NaN.
+    unsafe fn lesser(a: Self::Vector, b: Self::Vector) -> Self::Vector;
+    /// A bit a lane: `a <= b`.
+    unsafe fn at_most(a: Self::Vector, b: Self::Vector) -> u32;
+    /// A bit a lane: `a < b`.
+    unsafe fn less(a: Self::Vector, b: Self::Vector) -> u32;
+
+    /// [`single::meet_leaf`] compiled for the set, and kept out of the loop over nodes, which needs the registers.
+    unsafe fn meet_leaf<Q: Query>(words: *const u32, leaf: Child, ray: &PreparedRay, query: &mut Q) -> bool;
+}

@@ -1,0 +1,429 @@
+//! One ray through the tree.
+
+use std::mem::MaybeUninit;
+
+use glam::Vec3A;
+
+use super::super::collapse::MOST_DEPTH;
+use super::super::node::{Child, Node, TRIANGLE_WORDS, WIDTH};
+use super::{Lanes, Level, Portable, Set};
+use crate::accel::wide::Tree;
+use crate::geometry::triangle::{Sheared, decide};
+use crate::geometry::{Hit, Key, PreparedRay, Ray, TriangleHit};
+use crate::math::float::UNIT_ROUNDOFF;
+
+/// What a search looks for. The ends of the interval of t are in the space of the tree.
+pub trait Query {
+    /// Whether nearer children should come first.
+    const NEAR_FIRST: bool;
+
+    /// The least t that counts.
+    fn near(&self, ray: &PreparedRay) -> f32;
+
+    /// The largest t that still counts.
+    fn far(&self, ray: &PreparedRay) -> f32;
+
+    /// Takes note of a hit; true ends the search.
+    fn offer(&mut self, hit: TriangleHit, primitive: u32) -> bool;
+}
+
+/// The first hit.
+pub struct Closest<'a> {
+    /// The number to put into hits.
+    pub instance: u32,
+    /// The best so far.
+    pub best: &'a mut Hit,
+}
+
+impl Query for Closest<'_> {
+    const NEAR_FIRST: bool = true;
+
+    #[inline(always)]
+    fn near(&self, ray: &PreparedRay) -> f32 {
+        ray.lower_bound(ray.t_min)
+    }
+
+    #[inline(always)]
+    fn far(&self, ray: &PreparedRay) -> f32 {
+        ray.far_bound(self.best.t)
+    }
+
+    #[inline(always)]
+    fn offer(&mut self, hit: TriangleHit, primitive: u32) -> bool {
+        let hit = Hit { t: hit.t, u: hit.u, v: hit.v, instance: self.instance, primitive };
+        if hit.key().is_before(&self.best.key()) {
+            *self.best = hit;
+        }
+        false
+    }
+}
+
+/// The first hit after a key.
+pub struct NextAfter<'a> {
+    /// What comes before the hit.
+    pub key: Key,
+    /// The search among the others.
+    pub closest: Closest<'a>,
+}
+
+impl Query for NextAfter<'_> {
+    const NEAR_FIRST: bool = true;
+
+    #[inline(always)]
+    fn near(&self, ray: &PreparedRay) -> f32 {
+        self.closest.near(ray).max(ray.lower_bound(self.key.t))
+    }
+
+    #[inline(always)]
+    fn far(&self, ray: &PreparedRay) -> f32 {
+        self.closest.far(ray)
+    }
+
+    #[inline(always)]
+    fn offer(&mut self, hit: TriangleHit, primitive: u32) -> bool {
+        let key = Key { t: hit.t, instance: self.closest.instance, primitive };
+        self.key.is_before(&key) && self.closest.offer(hit, primitive)
+    }
+}
+
+/// Whether there is a hit.
+pub struct Occluded {
+    /// The answer.
+    pub found: bool,
+}
+
+impl Query for Occluded {
+    const NEAR_FIRST: bool = false;
+
+    #[inline(always)]
+    fn near(&self, ray: &PreparedRay) -> f32 {
+        ray.lower_bound(ray.t_min)
+    }
+
+    #[inline(always)]
+    fn far(&self, ray: &PreparedRay) -> f32 {
+        ray.upper_bound(ray.t_max)
+    }
+
+    #[inline(always)]
+    fn offer(&mut self, _: TriangleHit, _: u32) -> bool {
+        self.found = true;
+        true
+    }
+}
+
+/// Searches the tree with the instructions of a level.
+#[inline(always)]
+pub fn search<Q: Query>(level: Level, tree: &Tree, ray: &PreparedRay, query: &mut Q) {
+    // SAFETY: the processor has the level's instructions, and the tree's children are in range.
+    unsafe {
+        match level.0 {
+            Set::Portable => walk::<Portable, Q>(tree, ray, query),
+            #[cfg(target_arch = "x86_64")]
+            Set::Avx2 => walk_avx2(tree, ray, query),
+            #[cfg(target_arch = "x86_64")]
+            Set::Avx512 => walk_avx512(tree, ray, query),
+        }
+    }
+}
+
+/// The same for a ray that is not prepared: that is done with the level's instructions as well, and what is prepared stays in
+/// registers.
+#[inline(always)]
+pub fn search_alone<Q: Query>(level: Level, tree: &Tree, ray: &Ray, query: &mut Q) {
+    // SAFETY: as above.
+    unsafe {
+        match level.0 {
+            Set::Portable => prepare_and_walk::<Portable, Q>(tree, ray, query),
+            #[cfg(target_arch = "x86_64")]
+            Set::Avx2 => prepare_and_walk_avx2(tree, ray, query),
+            #[cfg(target_arch = "x86_64")]
+            Set::Avx512 => prepare_and_walk_avx512(tree, ray, query),
+        }
+    }
+}
+
+#[inline(always)]
+unsafe fn prepare_and_walk<L: Lanes, Q: Query>(tree: &Tree, ray: &Ray, query: &mut Q) {
+    if let Some(ray) = PreparedRay::new(ray) {
+        // SAFETY: as the caller promises.
+        unsafe { walk::<L, Q>(tree, &ray, query) }
+    }
+}
+
+/// The searches compiled for an instruction set.
+#[cfg(target_arch = "x86_64")]
+macro_rules! compile {
+    ($lanes:ty, $features:literal, $walk:ident, $prepare_and_walk:ident) => {
+        #[target_feature(enable = $features)]
+        unsafe fn $walk<Q: Query>(tree: &Tree, ray: &PreparedRay, query: &mut Q) {
+            // SAFETY: as the caller promises.
+            unsafe { walk::<$lanes, Q>(tree, ray, query) }
+        }
+
+        #[target_feature(enable = $features)]
+        unsafe fn $prepare_and_walk<Q: Query>(tree: &Tree, ray: &Ray, query: &mut Q) {
+            // SAFETY: as the caller promises.
+            unsafe { prepare_and_walk::<$lanes, Q>(tree, ray, query) }
+        }
+    };
+}
+#[cfg(target_arch = "x86_64")]
+compile!(super::avx2::Avx2, "avx2,bmi1", walk_avx2, prepare_and_walk_avx2);
+#[cfg(target_arch = "x86_64")]
+compile!(super::avx512::Avx512, "avx512f,avx512vl,avx512dq,bmi1", walk_avx512, prepare_and_walk_avx512);
+
+/// A child to be visited, with where the ray enters it in the upper half: larger is farther, for what is not negative.
+type Entry = u64;
+
+#[inline(always)]
+fn entry(near: f32, child: Child) -> Entry {
+    u64::from(near.to_bits()) << 32 | u64::from(child.0)
+}
+
+#[inline(always)]
+fn entry_near(entry: Entry) -> f32 {
+    f32::from_bits((entry >> 32) as u32)
+}
+
+#[inline(always)]
+fn entry_child(entry: Entry) -> Child {
+    Child(entry as u32)
+}
+
+/// A node's bytes, as a power of two.
+const NODE_SHIFT: u32 = size_of::<Node>().trailing_zeros();
+
+/// A plane of all children.
+const PLANE_BYTES: usize = WIDTH * size_of::<f32>();
+
+/// Each node on the way down leaves at most all children but one behind.
+const STACK: usize = (MOST_DEPTH + 1) * (WIDTH - 1) + 1;
+
+/// # Safety
+/// The processor has the instructions of `L`, and the children of `tree` are in range, at most [`MOST_DEPTH`] deep.
+#[inline(always)]
+unsafe fn walk<L: Lanes, Q: Query>(tree: &Tree, ray: &PreparedRay, query: &mut Q) {
+    unsafe {
+        let nodes: *const Node = tree.nodes.as_ptr();
+        let words: *const u32 = tree.leaves.words().as_ptr();
+        let near = L::splat(query.near(ray));
+        let mut far = query.far(ray);
+        let origin = [L::splat(ray.origin.x), L::splat(ray.origin.y), L::splat(ray.origin.z)];
+        // (o - b) (-1/d) is (b - o) (1/d) but for the sign of a zero, and subtracts straight from memory.
+        let inverse = [L::splat(-ray.inverse.x), L::splat(-ray.inverse.y), L::splat(-ray.inverse.z)];
+        let inverse_far = [L::splat(-ray.inverse_far.x), L::splat(-ray.inverse_far.y), L::splat(-ray.inverse_far.z)];
+        // In bytes from the node's first: the planes that the ray enters and leaves through.
+        let mut enter = [0; 3];
+        let mut leave = [0; 3];
+        for axis in 0..3 {
+            let lower = 2 * axis * PLANE_BYTES;
+            let side = if ray.is_negative(axis) { PLANE_BYTES } else { 0 };
+            (enter[axis], leave[axis]) = (lower + side, lower + (PLANE_BYTES - side));
+        }
+
+        let mut stack = [const { MaybeUninit::<Entry>::uninit() }; STACK];
+        let mut height = 0;
+        let mut current = tree.root;
+        if current == Child::NONE {
+            return;
+        }
+        loop {
+            if current.is_leaf() {
+                if L::meet_leaf(words, current, ray, query) {
+                    return;
+                }
+                far = query.far(ray);
+            } else {
+                let node = &*nodes.byte_add(current.number() << NODE_SHIFT);
+                let planes: *const f32 = node.planes.as_ptr().cast();
+                let mut first = near;
+                let mut last = L::splat(far);
+                for axis in 0..3 {
+                    let entry = L::sub(origin[axis], L::load(planes.byte_add(enter[axis])));
+                    let exit = L::sub(origin[axis], L::load(planes.byte_add(leave[axis])));
+                    first = L::greater(L::mul(entry, inverse[axis]), first);
+                    last = L::lesser(L::mul(exit, inverse_far[axis]), last);
+                }
+                let mut crossed = L::at_most(first, last);
+                if crossed != 0 {
+                    let children = node.children.as_ptr();
+                    let lane = crossed.trailing_zeros() as usize;
+                    crossed &= crossed - 1;
+                    let child = *children.add(lane);
+                    if crossed == 0 {
+                        current = child;
+                        continue;
+                    }
+                    let mut nears = MaybeUninit::<[f32; WIDTH]>::uninit();
+                    let nears: *mut f32 = nears.as_mut_ptr().cast();
+                    L::store(nears, first);
+                    let one = entry(*nears.add(lane), child);
+                    let lane = crossed.trailing_zeros() as usize;
+                    crossed &= crossed - 1;
+                    let other = entry(*nears.add(lane), *children.add(lane));
+                    let stack: *mut Entry = stack.as_mut_ptr().cast();
+                    if !Q::NEAR_FIRST {
+                        stack.add(height).write(other);
+                        height += 1;
+                        while crossed != 0 {
+                            let lane = crossed.trailing_zeros() as usize;
+                            crossed &= crossed - 1;
+                            stack.add(height).write(entry(*nears.add(lane), *children.add(lane)));
+                            height += 1;
+                        }
+                        current = entry_child(one);
+                        continue;
+                    }
+                    // The nearest is next; the others go on the stack in order.
+                    let (mut next, farther) = (one.min(other), one.max(other));
+                    let base = height;
+                    stack.add(height).write(farther);
+                    height += 1;
+                    while crossed != 0 {
+                        let lane = crossed.trailing_zeros() as usize;
+                        crossed &= crossed - 1;
+                        let one = entry(*nears.add(lane), *children.add(lane));
+                        let farther = one.max(next);
+                        next = one.min(next);
+                        let mut at = height;
+                        height += 1;
+                        while at > base && *stack.add(at - 1) < farther {
+                            *stack.add(at) = *stack.add(at - 1);
+                            at -= 1;
+                        }
+                        stack.add(at).write(farther);
+                    }
+                    current = entry_child(next);
+                    continue;
+                }
+            }
+            loop {
+                if height == 0 {
+                    return;
+                }
+                height -= 1;
+                let top = stack.get_unchecked(height).assume_init();
+                if entry_near(top) <= far {
+                    current = entry_child(top);
+                    break;
+                }
+            }
+        }
+    }
+}
+
+/// Meets a ray with the triangles of a leaf; true ends the search.
+///
+/// The vectors do what [`intersect_triangle`] does first, up to the signs of the edge functions in f32, which only ever
+/// tell what is missed; what they leave is met by itself.
+#[inline(always)]
+pub(super) unsafe fn meet_leaf<L: Lanes, Q: Query>(
+    words: *const u32,
+    leaf: Child,
+    ray: &PreparedRay,
+    query: &mut Q,
+) -> bool {
+    unsafe {
+        let count = leaf.count();
+        let numbers: *const f32 = words.add(leaf.first() * TRIANGLE_WORDS).cast();
+        let [kx, ky, kz] = ray.axes;
+        let origin: *const f32 = (&raw const ray.origin).cast();
+        let (ox, oy, oz) = (L::splat(*origin.add(kx)), L::splat(*origin.add(ky)), L::splat(*origin.add(kz)));
+        let (sx, sy) = (L::splat(ray.shear.x), L::splat(ray.shear.y));
+        let mut sheared = [[L::splat(0.0); 3]; 3];
+        for (corner, sheared) in sheared.iter_mut().enumerate() {
+            let run = numbers.add(3 * corner * count);
+            let along = L::sub(L::load(run.add(kz * count)), oz);
+            let x = L::sub(L::load(run.add(kx * count)), ox);
+            let y = L::sub(L::load(run.add(ky * count)), oy);
+            *sheared = [L::sub(x, L::mul(sx, along)), L::sub(y, L::mul(sy, along)), along];
+        }
+        let [[ax, ay, _], [bx, by, _], [cx, cy, _]] = sheared;
+        let weight_a = L::sub(L::mul(cx, by), L::mul(cy, bx));
+        let weight_b = L::sub(L::mul(ax, cy), L::mul(ay, cx));
+        let weight_c = L::sub(L::mul(bx, ay), L::mul(by, ax));
+        let weights = [weight_a, weight_b, weight_c];
+        let zero = L::splat(0.0);
+        // One of the operands, so that what is below 0 is a weight's, though not each NaN is passed on.
+        let least = L::lesser(L::lesser(weight_a, weight_b), weight_c);
+        let most = L::greater(L::greater(weight_a, weight_b), weight_c);
+        let both_signs = L::less(least, zero) & L::less(zero, most);
+        let mut left = !both_signs & ((1 << count) - 1);
+        if left == 0 {
+            return false;
+        }
+        if ray.starts_at_origin() {
+            left &= !behind::<L>(&sheared, weights, ray.direction[kz]);
+            if left == 0 {
+                return false;
+            }
+        }
+        let mut columns = MaybeUninit::<[[f32; WIDTH]; 9]>::uninit();
+        let column: *mut f32 = columns.as_mut_ptr().cast();
+        for (corner, parts) in sheared.into_iter().enumerate() {
+            for (part, vector) in parts.into_iter().enumerate() {
+                L::store(column.add((3 * part + corner) * WIDTH), vector);
+            }
+        }
+        while left != 0 {
+            let lane = left.trailing_zeros() as usize;
+            left &= left - 1;
+            let part = |number: usize| {
+                let first = column.add(3 * number * WIDTH + lane);
+                // Volatile, since a wide load across what was just stored in parts would wait for all of it.
+                [first, first.add(WIDTH), first.add(2 * WIDTH)].map(|number| number.read_volatile())
+            };
+            let sheared = Sheared { x: part(0), y: part(1), z: part(2) };
+            let corner = |number: usize| {
+                let first = numbers.add(3 * number * count + lane);
+                Vec3A::new(*first, *first.add(count), *first.add(2 * count))
+            };
+            if let Some(hit) = decide(ray, [corner(0), corner(1), corner(2)], &sheared) {
+                let primitive = (*numbers.add(9 * count + lane)).to_bits();
+                if query.offer(hit, primitive) {
+                    return true;
+                }
+            }
+        }
+        false
+    }
+}
+
+/// A bit for each triangle that [`decide`] would certainly put before the ray's origin, if it did not sort it out before. Most
+/// rays start on a triangle.
+///
+/// The sign of t is that of `N / (det d_z)` with `N` the sum of weights times z. Let M be the largest |x| and |y|, Z the
+/// largest |z|. A weight, two products of at most M^2 and their difference, is off by 4 u M^2 at most in f32, each of the three
+/// terms of N by 6 u M^2 Z, and N with its two sums by less than 32 u M^2 Z; the terms of 2^-100 and 2^-140 are for underflow.
+/// The determinant has the sign of the weights that are not 0, or the ray passes by.
+///
+/// Where N in f32 is beyond 80 u M^2 Z, it is beyond 48 u M^2 Z without rounding, and `|t d_z|` beyond 8 u Z since |det| is at
+/// most 6 M^2. Then the near end of the triangle's box is before the origin too, and t cannot be clamped past it: along z the
+/// box begins before t does; along another axis the crossing is at `d t (1 + 3 u) + h`, where |h| is less than the box was
+/// enlarged by or, where it is flat, at most `3 u e_z |d / d_z|`
+/// ([`hit_bounds`](crate::geometry::triangle::hit_bounds)), and e_z is at most 2 Z.
+#[inline(always)]
+unsafe fn behind<L: Lanes>(sheared: &[[L::Vector; 3]; 3], weights: [L::Vector; 3], along: f32) -> u32 {
+    unsafe {
+        let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = *sheared;
+        let [wa, wb, wc] = weights;
+        let sum = L::add(L::add(L::mul(wa, az), L::mul(wb, bz)), L::mul(wc, cz));
+        let determinant = L::add(L::add(wa, wb), wc);
+        let beside = L::greater(L::greater(L::abs(ax), L::abs(ay)), L::greater(L::abs(bx), L::abs(by)));
+        let beside = L::greater(beside, L::greater(L::abs(cx), L::abs(cy)));
+        let far = L::greater(L::greater(L::abs(az), L::abs(bz)), L::abs(cz));
+        let area = L::add(L::mul(beside, beside), L::splat(TINY_AREA));
+        let error = L::add(L::mul(L::mul(area, far), L::splat(80.0 * UNIT_ROUNDOFF as f32)), L::splat(TINY));
+        let zero = L::splat(0.0);
+        let (below, above) = (L::less(L::add(sum, error), zero), L::less(error, sum));
+        let (negative, positive) = (L::less(determinant, zero), L::less(zero, determinant));
+        if along > 0.0 { (below & positive) | (above & negative) } else { (above & positive) | (below & negative) }
+    }
+}
+
+/// 2^-100
+const TINY_AREA: f32 = f32::from_bits((127 - 100) << 23);
+
+/// 2^-140
+const TINY: f32 = f32::from_bits(1 << (149 - 140));

@@ -1,0 +1,143 @@
+//! Instruction sets against each other, leaves and nodes of all sizes, and degenerate trees.
+
+use glam::Vec3;
+
+use super::simd::Level;
+use super::*;
+use crate::accel::{Kind, Linear};
+use crate::geometry::Ray;
+use crate::math::random::Random;
+use crate::progress::Silent;
+
+fn soup(triangles: impl IntoIterator<Item = [Vec3; 3]>) -> TriangleMesh {
+    let positions: Vec<Vec3> = triangles.into_iter().flatten().collect();
+    let indices = (0..positions.len() as u32 / 3).map(|n| [3 * n, 3 * n + 1, 3 * n + 2]).collect();
+    TriangleMesh { positions, indices, ..TriangleMesh::default() }.finish().unwrap()
+}
+
+fn confetti(count: usize, size: f64, random: &mut Random) -> TriangleMesh {
+    soup((0..count).map(|_| {
+        let center = random.in_cube();
+        [(); 3].map(|()| (center + random.in_cube() * size).as_vec3())
+    }))
+}
+
+/// Rays across and from within the cube, some along axes and some with bounded intervals.
+fn rays(count: usize, random: &mut Random) -> Vec<Ray> {
+    (0..count)
+        .map(|number| {
+            let mut direction = random.direction().as_vec3();
+            if number % 5 == 0 {
+                direction[random.below(3) as usize] = [0.0, -0.0][number / 5 % 2];
+            }
+            let ray = Ray::new((random.in_cube() * 2.0).as_vec3(), direction);
+            if number % 3 == 0 { Ray { t_min: 0.2, t_max: 1.5, ..ray } } else { ray }
+        })
+        .collect()
+}
+
+/// Whether an instance's box is the whole of space, or begins behind the ray's origin, or before it.
+fn prepared(ray: &Ray, number: usize) -> Option<PreparedRay> {
+    let mut prepared = PreparedRay::new(ray)?;
+    match number % 4 {
+        0 => prepared.clip.near = 0.5,
+        1 => prepared.clip.far = 1.0,
+        _ => {}
+    }
+    Some(prepared)
+}
+
+#[test]
+fn all_instruction_sets_give_the_hits_of_the_reference() {
+    let mut random = Random::new(4, 0x51d);
+    // One leaf of each size, and trees.
+    for count in (1..=9).chain([40, 300, 3000]) {
+        let mesh = confetti(count, if count > 100 { 0.2 } else { 0.7 }, &mut random);
+        let params = Params { kind: Kind::Wide, ..Params::default() };
+        let linear = Linear::build(&mesh, &params, &Silent).unwrap();
+        let rays = rays(600, &mut random);
+        for level in Level::available() {
+            let wide = Wide::build(&mesh, &params, &Silent).unwrap().with_level(level);
+            let (mut hits, mut second) = (0, 0);
+            for (number, ray) in rays.iter().enumerate() {
+                assert_eq!(wide.closest_alone(ray), linear.closest_alone(ray), "{} {ray:?}", level.name());
+                assert_eq!(wide.occluded_alone(ray), linear.occluded_alone(ray), "{} {ray:?}", level.name());
+                let Some(ray) = prepared(ray, number) else { continue };
+                let closest = |tree: &dyn Fn(&mut Hit)| {
+                    let mut hit = Hit::MISS;
+                    tree(&mut hit);
+                    hit
+                };
+                let hit = closest(&|hit| linear.closest(&ray, 7, hit));
+                assert_eq!(closest(&|hit| wide.closest(&ray, 7, hit)), hit, "{} {ray:?}", level.name());
+                assert_eq!(wide.occluded(&ray), hit.is_hit(), "{} {ray:?}", level.name());
+                let next = closest(&|next| linear.next_after(&ray, 7, hit.key(), next));
+                assert_eq!(
+                    closest(&|next| wide.next_after(&ray, 7, hit.key(), next)),
+                    next,
+                    "{} {ray:?}",
+                    level.name()
+                );
+                hits += usize::from(hit.is_hit());
+                second += usize::from(next.is_hit());
+            }
+            assert!(count < 40 || hits > 20 && second > 3, "{hits} and {second} of {} rays hit", rays.len());
+        }
+    }
+}
+
+#[test]
+fn nested_triangles_make_a_tree_of_bounded_depth() {
+    // Each encloses all before it: binary trees become chains.
+    let nested = (0..3000).map(|n| {
+        let size = 1.0 + n as f32;
+        [Vec3::new(-size, -size, 0.0), Vec3::new(size, -size, 0.0), Vec3::new(0.0, size, 0.0)]
+    });
+    let wide = Wide::build(&soup(nested), &Params::default(), &Silent).unwrap();
+    assert_eq!(wide.validate(), Ok(()));
+    assert!(wide.stats().max_depth as usize <= MOST_DEPTH);
+    let mut hit = Hit::MISS;
+    let ray = Ray::new(Vec3::new(0.0, 0.0, 1.0), Vec3::NEG_Z);
+    wide.closest(&PreparedRay::new(&ray).unwrap(), 0, &mut hit);
+    assert_eq!((hit.t, hit.primitive), (1.0, 0));
+}
+
+#[test]
+fn deep_ends_are_cut_evenly() {
+    let mut random = Random::new(9, 0x51d);
+    let mesh = confetti(5000, 0.1, &mut random);
+    let live: Vec<u32> = mesh.live_triangles().collect();
+    let boxes: Vec<Bounds> = live.iter().map(|&number| hit_bounds(mesh.triangle(number))).collect();
+    // A chain: each inner node has one leaf and the next inner node.
+    let count = boxes.len();
+    let mut nodes = Vec::new();
+    let around = |from: usize| boxes[from..].iter().fold(Bounds::EMPTY, |all, &one| all.union(one));
+    nodes.push(crate::accel::topology::Node { bounds: around(0), first: 1, count: 0 });
+    for item in 0..count - 1 {
+        let leaf = |item: usize| crate::accel::topology::Node { bounds: boxes[item], first: item as u32, count: 1 };
+        let next = nodes.len() as u32 + 2;
+        nodes.push(leaf(item));
+        nodes.push(if item + 2 < count {
+            crate::accel::topology::Node { bounds: around(item + 1), first: next, count: 0 }
+        } else {
+            leaf(item + 1)
+        });
+    }
+    let topology = Topology { nodes, order: (0..count as u32).collect() };
+    let triangles: Vec<_> = live.iter().map(|&number| LeafTriangle::new(&mesh, number)).collect();
+    let mut collapse = Collapse::new(&topology, &triangles);
+    let root = collapse.run();
+    let tree = Tree { nodes: collapse.nodes, leaves: collapse.leaves, root };
+    let wide = Wide { tree, bounds: topology.nodes[0].bounds, level: Level::chosen() };
+    assert_eq!(wide.validate(), Ok(()));
+    assert!(wide.stats().max_depth > 30 && wide.stats().max_depth as usize <= MOST_DEPTH);
+}
+
+#[test]
+fn triangles_take_at_most_64_bytes_with_their_nodes() {
+    let mut random = Random::new(5, 0x51d);
+    let wide = Wide::build(&confetti(20_000, 0.05, &mut random), &Params::default(), &Silent).unwrap();
+    let stats = wide.stats();
+    let bytes = (stats.node_bytes + stats.leaf_bytes) as f64 / stats.triangles as f64;
+    assert!(bytes < 64.0, "{bytes} bytes a triangle");
+}
