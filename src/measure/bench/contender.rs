@@ -8,9 +8,9 @@ use crate::accel::{Kind, Params, Preset};
 use crate::error::{Error, Result};
 use crate::geometry::{Hit, Ray};
 #[cfg(feature = "embree")]
-use crate::measure::peers::Surface;
-#[cfg(feature = "embree")]
 use crate::measure::peers::embree::{EmbreeScene, Library};
+#[cfg(any(feature = "embree", feature = "peers"))]
+use crate::measure::peers::{Built, Peer, Surface};
 use crate::measure::statistics::median;
 use crate::progress::Progress;
 use crate::render::Renderer;
@@ -168,22 +168,24 @@ fn in_pool<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> Result<T
     Ok(pool.install(work))
 }
 
+/// A peer that is asked one call a ray.
+#[cfg(any(feature = "embree", feature = "peers"))]
+struct Singles<P>(P);
+
+#[cfg(any(feature = "embree", feature = "peers"))]
+impl<P: std::ops::Deref<Target: Peer> + Sync> Contender for Singles<P> {
+    fn closest(&self, _: Calls, rays: &[Ray], hits: &mut [Hit]) {
+        rays.iter().zip(hits).for_each(|(ray, hit)| *hit = self.0.closest(ray));
+    }
+
+    fn occluded(&self, _: Calls, rays: &[Ray], flags: &mut [bool]) {
+        rays.iter().zip(flags).for_each(|(ray, flag)| *flag = self.0.occluded(ray));
+    }
+}
+
 #[cfg(feature = "embree")]
 pub mod embree {
     use super::*;
-
-    /// A call a ray.
-    struct Singles(Arc<EmbreeScene>);
-
-    impl Contender for Singles {
-        fn closest(&self, _: Calls, rays: &[Ray], hits: &mut [Hit]) {
-            rays.iter().zip(hits).for_each(|(ray, hit)| *hit = self.0.closest(ray));
-        }
-
-        fn occluded(&self, _: Calls, rays: &[Ray], flags: &mut [bool]) {
-            rays.iter().zip(flags).for_each(|(ray, flag)| *flag = self.0.occluded(ray));
-        }
-    }
 
     /// A call a packet.
     struct Packets(Arc<EmbreeScene>);
@@ -201,37 +203,81 @@ pub mod embree {
     /// Builds Embree's fast and robust scenes: three contenders, the first of which others are compared with.
     pub fn all(
         library: &Library,
-        surfaces: Vec<Surface>,
+        surfaces: &Arc<[Surface]>,
         threads: &[usize],
         progress: &dyn Progress,
     ) -> Result<Vec<Entry>> {
-        let surfaces: Arc<[Surface]> = surfaces.into();
-        let triangles: usize = surfaces.iter().map(|surface| surface.indices.len()).sum();
         let scene = |robust: bool| {
             let build = |threads: usize| {
-                let (scene, commit) = EmbreeScene::build(library, &surfaces, robust, threads)?;
-                Ok(((scene, commit.bytes), commit.seconds))
+                let Built { peer, seconds, bytes } = EmbreeScene::build(library, surfaces, robust, threads)?;
+                Ok(((peer, bytes), seconds))
             };
             let ((scene, bytes), builds) = build_each(threads, progress, build)?;
-            Ok::<_, Error>((Arc::new(scene), builds, bytes as f64 / triangles as f64))
+            Ok::<_, Error>((Arc::new(scene), builds, bytes))
         };
-        let entry = |name: &str, calls, contender, builds: &Vec<(usize, f64)>, bytes_per_triangle| Entry {
-            contender,
-            accelerator: name.into(),
-            preset: "medium",
-            peer: true,
-            calls: vec![calls],
-            builds: builds.clone(),
-            bytes_per_triangle,
+        let entry = |name: &str, calls, contender, builds: &[(usize, f64)], bytes| {
+            peer(name, "medium", calls, contender, builds, bytes, surfaces)
         };
         let (fast, builds, bytes) = scene(false)?;
-        let mut all = vec![entry(EMBREE, Calls::Single, Box::new(Singles(Arc::clone(&fast))) as _, &builds, bytes)];
+        let mut all = vec![entry(EMBREE, Calls::Single, Box::new(Singles(Arc::clone(&fast))), &builds, bytes)];
         if library.packet_width().is_some() {
-            all.push(entry("embree-packet", Calls::Batch, Box::new(Packets(fast)) as _, &builds, bytes));
+            all.push(entry("embree-packet", Calls::Batch, Box::new(Packets(fast)), &builds, bytes));
         }
         let (robust, builds, bytes) = scene(true)?;
-        all.insert(1, entry("embree-robust", Calls::Single, Box::new(Singles(robust)) as _, &builds, bytes));
+        all.insert(1, entry("embree-robust", Calls::Single, Box::new(Singles(robust)), &builds, bytes));
         Ok(all)
+    }
+}
+
+/// Builds the other crates' structures.
+///
+/// # Errors
+/// A cancellation, or what a crate does not take.
+#[cfg(feature = "peers")]
+pub fn crates(surfaces: &[Surface], threads: &[usize], progress: &dyn Progress) -> Result<Vec<Entry>> {
+    use crate::measure::peers::bounding_volumes::BoundingVolumes;
+    use crate::measure::peers::obvhs::Obvhs;
+    use crate::measure::peers::parry::Parry;
+    let mut all = Vec::new();
+    let mut add = |name: &str, preset, build: &(dyn Fn() -> Result<Built<Box<dyn Peer>>> + Sync)| {
+        let build = |threads: usize| {
+            let Built { peer, seconds, bytes } = in_pool(threads, build)??;
+            Ok(((peer, bytes), seconds))
+        };
+        let ((contender, bytes), builds) = build_each(threads, progress, build)?;
+        all.push(peer(name, preset, Calls::Single, Box::new(Singles(contender)), &builds, bytes, surfaces));
+        Ok::<(), Error>(())
+    };
+    fn boxed<P: Peer + 'static>(Built { peer, seconds, bytes }: Built<P>) -> Built<Box<dyn Peer>> {
+        Built { peer: Box::new(peer), seconds, bytes }
+    }
+    add("obvhs-bvh2", "medium", &|| Ok(boxed(Obvhs::<::obvhs::bvh2::Bvh2>::build(surfaces))))?;
+    add("obvhs-cwbvh", "medium", &|| Ok(boxed(Obvhs::<::obvhs::cwbvh::CwBvh>::build(surfaces))))?;
+    add("parry3d", "-", &|| Parry::build(surfaces).map(boxed))?;
+    add("bvh", "-", &|| Ok(boxed(BoundingVolumes::build(surfaces))))?;
+    Ok(all)
+}
+
+/// A peer as it takes part.
+#[cfg(any(feature = "embree", feature = "peers"))]
+fn peer(
+    name: &str,
+    preset: &'static str,
+    calls: Calls,
+    contender: Box<dyn Contender>,
+    builds: &[(usize, f64)],
+    bytes: u64,
+    surfaces: &[Surface],
+) -> Entry {
+    let triangles: usize = surfaces.iter().map(|surface| surface.indices.len()).sum();
+    Entry {
+        contender,
+        accelerator: name.into(),
+        preset,
+        peer: true,
+        calls: vec![calls],
+        builds: builds.to_vec(),
+        bytes_per_triangle: bytes as f64 / triangles as f64,
     }
 }
 

@@ -14,12 +14,16 @@ pub mod rays;
 mod run;
 
 use std::io::Write;
+#[cfg(any(feature = "embree", feature = "peers"))]
+use std::sync::Arc;
 
 use crate::accel::{Kind, Params};
 use crate::error::{Error, Result};
 use crate::measure::environment::Environment;
+#[cfg(any(feature = "embree", feature = "peers"))]
+use crate::measure::peers::Surface;
 #[cfg(feature = "embree")]
-use crate::measure::peers::{Surface, embree::Library};
+use crate::measure::peers::embree::Library;
 use crate::measure::ray_set::RaySet;
 use crate::progress::Progress;
 use crate::render::Renderer;
@@ -54,6 +58,18 @@ pub struct Options {
     /// Embree, if it takes part.
     #[cfg(feature = "embree")]
     pub embree: Option<Library>,
+}
+
+#[cfg(any(feature = "embree", feature = "peers"))]
+impl Options {
+    /// Whether other programs take part.
+    fn has_peers(&self) -> bool {
+        #[cfg(feature = "embree")]
+        if self.embree.is_some() {
+            return true;
+        }
+        cfg!(feature = "peers")
+    }
 }
 
 /// Everything that was measured.
@@ -239,41 +255,40 @@ impl Bench {
             }
             entries.push(contender::structure(scene, *params, &options.threads, progress)?);
         }
-        #[cfg(feature = "embree")]
-        if let Some(library) = &options.embree {
-            self.add_embree(name, scene, library, options, &mut entries, progress)?;
-        }
+        #[cfg(any(feature = "embree", feature = "peers"))]
+        entries.extend(self.peers(name, scene, options, progress)?);
         if entries.is_empty() {
             return Err(Error::caller("there is nothing to measure").remedy("choose other accelerators or fewer rays"));
         }
         Ok(entries)
     }
 
-    /// Embree with the triangles of the scene.
-    #[cfg(feature = "embree")]
-    fn add_embree(
-        &mut self,
-        name: &str,
-        scene: &Scene,
-        library: &Library,
-        options: &Options,
-        entries: &mut Vec<Entry>,
-        progress: &dyn Progress,
-    ) -> Result<()> {
-        let surfaces = Surface::all(scene)?;
-        if surfaces.is_empty() {
-            self.notes.push(format!("{name}: Embree is left out: there are no triangles."));
-            return Ok(());
-        }
+    /// Other programs with the triangles of the scene.
+    #[cfg(any(feature = "embree", feature = "peers"))]
+    fn peers(&mut self, name: &str, scene: &Scene, options: &Options, progress: &dyn Progress) -> Result<Vec<Entry>> {
+        let mut all = Vec::new();
+        let surfaces: Arc<[Surface]> = match Surface::all(scene)? {
+            _ if !options.has_peers() => return Ok(all),
+            none if none.is_empty() => {
+                self.notes.push(format!("{name}: peers are left out: there are no triangles."));
+                return Ok(all);
+            }
+            some => some.into(),
+        };
         if !scene.quadrics.is_empty() {
             self.notes
-                .push(format!("{name}: Embree has the triangles alone, not the {} quadrics.", scene.quadrics.len()));
+                .push(format!("{name}: peers have the triangles alone, not the {} quadrics.", scene.quadrics.len()));
         }
         if scene.objects.len() > 1 {
-            self.notes.push(format!("{name}: Embree has the triangles of {} objects flattened.", surfaces.len()));
+            self.notes.push(format!("{name}: peers have the triangles of {} objects flattened.", surfaces.len()));
         }
-        entries.extend(contender::embree::all(library, surfaces, &options.threads, progress)?);
-        Ok(())
+        #[cfg(feature = "embree")]
+        if let Some(library) = &options.embree {
+            all.extend(contender::embree::all(library, &surfaces, &options.threads, progress)?);
+        }
+        #[cfg(feature = "peers")]
+        all.extend(contender::crates(&surfaces, &options.threads, progress)?);
+        Ok(all)
     }
 }
 

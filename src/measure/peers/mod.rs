@@ -1,11 +1,37 @@
 //! Other programs' structures, asked the same rays.
 
 use crate::error::Result;
+use crate::geometry::{Hit, Ray};
 use crate::render::world::World;
 use crate::scene::{Scene, Shape};
 
+#[cfg(feature = "peers")]
+pub mod bounding_volumes;
 #[cfg(feature = "embree")]
 pub mod embree;
+#[cfg(feature = "peers")]
+pub mod obvhs;
+#[cfg(feature = "peers")]
+pub mod parry;
+
+/// A structure that answers one ray a call; rays must be valid.
+pub trait Peer: Send + Sync {
+    /// The closest hit, with the renderer's numbers.
+    fn closest(&self, ray: &Ray) -> Hit;
+
+    /// Whether there is any hit.
+    fn occluded(&self, ray: &Ray) -> bool;
+}
+
+/// What a peer built.
+pub struct Built<P> {
+    /// It.
+    pub peer: P,
+    /// Wall-clock seconds.
+    pub seconds: f64,
+    /// Bytes of nodes and of what leaves hold; vertices and indices that are shared with others do not count.
+    pub bytes: u64,
+}
 
 /// An object's triangles in the renderer's world, as peers take them.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,6 +75,13 @@ impl Surface {
         Ok(all)
     }
 
+    /// The triangles that can be hit: instance, number and corners.
+    pub fn triangles(&self) -> impl Iterator<Item = (u32, u32, [glam::Vec3; 3])> + '_ {
+        let corner = |index: u32| glam::Vec3::from_slice(&self.coordinates[3 * index as usize..]);
+        let live = (0..).zip(&self.indices).filter(|(_, indices)| **indices != [0; 3]);
+        live.map(move |(number, indices)| (self.instance, number, indices.map(corner)))
+    }
+
     /// How many vertices there are.
     pub fn vertex_count(&self) -> usize {
         self.coordinates.len() / 3
@@ -78,5 +111,7 @@ mod tests {
         assert_eq!((*instance, surfaces[0].vertex_count(), coordinates.len()), (1, 4, 13));
         assert_eq!(coordinates[3..6], [1.0, 0.0, 5.0]);
         assert_eq!(indices[..], [[0, 1, 2], [0; 3], [0; 3], [1, 2, 3]]);
+        let live: Vec<_> = surfaces[0].triangles().map(|(instance, number, [a, ..])| (instance, number, a)).collect();
+        assert_eq!(live, [(1, 0, Vec3::Z * 5.0), (1, 3, Vec3::new(1.0, 0.0, 5.0))]);
     }
 }

@@ -14,7 +14,7 @@ use std::time::Instant;
 
 use crate::error::{Error, Result};
 use crate::geometry::{Hit, Ray};
-use crate::measure::peers::Surface;
+use crate::measure::peers::{Built, Peer, Surface};
 
 /// A device, scene or geometry.
 type Handle = *mut c_void;
@@ -312,15 +312,6 @@ unsafe extern "C" fn count_bytes(counter: *mut c_void, bytes: isize, _after: boo
     true
 }
 
-/// What a commit took.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Commit {
-    /// Wall-clock seconds.
-    pub seconds: f64,
-    /// Bytes that Embree holds afterwards; the buffers that are shared with it are not among them.
-    pub bytes: u64,
-}
-
 /// A committed scene of triangles.
 pub struct EmbreeScene {
     functions: Functions,
@@ -346,7 +337,7 @@ impl EmbreeScene {
     ///
     /// # Panics
     /// If an index is not below the number of vertices.
-    pub fn build(library: &Library, surfaces: &Arc<[Surface]>, robust: bool, threads: usize) -> Result<(Self, Commit)> {
+    pub fn build(library: &Library, surfaces: &Arc<[Surface]>, robust: bool, threads: usize) -> Result<Built<Self>> {
         let device = Device::new(library, threads)?;
         let functions = library.functions;
         for surface in surfaces.iter() {
@@ -383,43 +374,7 @@ impl EmbreeScene {
         let seconds = start.elapsed().as_secs_f64();
         scene._device.check()?;
         let bytes = scene._device.bytes.load(Ordering::Relaxed).max(0) as u64;
-        Ok((scene, Commit { seconds, bytes }))
-    }
-
-    /// `rtcIntersect1`: the closest hit as Embree finds it; the ray must be valid.
-    #[inline]
-    pub fn closest(&self, ray: &Ray) -> Hit {
-        debug_assert!(ray.is_valid());
-        let hit = SingleHit {
-            normal: [0.0; 3],
-            u: 0.0,
-            v: 0.0,
-            primitive: NOTHING,
-            geometry: NOTHING,
-            instance: NOTHING,
-            instance_primitive: NOTHING,
-        };
-        let mut query = SingleQuery { ray: single(ray), hit };
-        // SAFETY: the scene is committed, the record has the layout and alignment of RTCRayHit, and null stands for
-        // default arguments.
-        unsafe { (self.functions.intersect_1)(self.handle, &mut query, null_mut()) };
-        let SingleQuery { ray, hit } = query;
-        if hit.geometry == NOTHING {
-            return Hit::MISS;
-        }
-        Hit { t: ray.t_far, u: hit.u, v: hit.v, instance: hit.geometry, primitive: hit.primitive }
-    }
-
-    /// `rtcOccluded1`: whether Embree finds any hit; the ray must be valid.
-    #[inline]
-    pub fn occluded(&self, ray: &Ray) -> bool {
-        debug_assert!(ray.is_valid());
-        let mut ray = single(ray);
-        // SAFETY: the scene is committed, the record has the layout and alignment of RTCRay, and null stands for default
-        // arguments.
-        unsafe { (self.functions.occluded_1)(self.handle, &mut ray, null_mut()) };
-        // A ray that is blocked ends before it begins.
-        ray.t_far < 0.0
+        Ok(Built { peer: scene, seconds, bytes })
     }
 
     /// The closest hits in packets as wide as Embree has natively, with the coherent flag; the slices have equal lengths
@@ -489,6 +444,44 @@ impl EmbreeScene {
                 *flag = t_far < 0.0;
             }
         }
+    }
+}
+
+impl Peer for EmbreeScene {
+    /// `rtcIntersect1`: the closest hit as Embree finds it.
+    #[inline]
+    fn closest(&self, ray: &Ray) -> Hit {
+        debug_assert!(ray.is_valid());
+        let hit = SingleHit {
+            normal: [0.0; 3],
+            u: 0.0,
+            v: 0.0,
+            primitive: NOTHING,
+            geometry: NOTHING,
+            instance: NOTHING,
+            instance_primitive: NOTHING,
+        };
+        let mut query = SingleQuery { ray: single(ray), hit };
+        // SAFETY: the scene is committed, the record has the layout and alignment of RTCRayHit, and null stands for
+        // default arguments.
+        unsafe { (self.functions.intersect_1)(self.handle, &mut query, null_mut()) };
+        let SingleQuery { ray, hit } = query;
+        if hit.geometry == NOTHING {
+            return Hit::MISS;
+        }
+        Hit { t: ray.t_far, u: hit.u, v: hit.v, instance: hit.geometry, primitive: hit.primitive }
+    }
+
+    /// `rtcOccluded1`: whether Embree finds any hit.
+    #[inline]
+    fn occluded(&self, ray: &Ray) -> bool {
+        debug_assert!(ray.is_valid());
+        let mut ray = single(ray);
+        // SAFETY: the scene is committed, the record has the layout and alignment of RTCRay, and null stands for default
+        // arguments.
+        unsafe { (self.functions.occluded_1)(self.handle, &mut ray, null_mut()) };
+        // A ray that is blocked ends before it begins.
+        ray.t_far < 0.0
     }
 }
 

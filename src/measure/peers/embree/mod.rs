@@ -5,4 +5,4 @@
 
 mod library;
 
-pub use library::{Commit, EmbreeScene, Library};
+pub use library::{EmbreeScene, Library};
