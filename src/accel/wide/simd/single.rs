@@ -204,6 +204,23 @@ const STACK: usize = (MOST_DEPTH + 1) * (WIDTH - 1) + 1;
 /// The processor has the instructions of `L`, and the children of `tree` are in range, at most [`MOST_DEPTH`] deep.
 #[inline(always)]
 unsafe fn walk<L: Lanes, Q: Query>(tree: &Tree, ray: &PreparedRay, query: &mut Q) {
+    // SAFETY: as the caller promises.
+    unsafe {
+        // Without an infinite inverse no product can be NaN: 0 times infinity does not occur.
+        if ray.inverse.is_finite() {
+            walk_nodes::<L, Q, false>(tree, ray, query);
+        } else {
+            walk_nodes::<L, Q, true>(tree, ray, query);
+        }
+    }
+}
+
+/// The search; `PARALLEL` tells that the ray may run along an axis.
+///
+/// # Safety
+/// As for [`walk`].
+#[inline(always)]
+unsafe fn walk_nodes<L: Lanes, Q: Query, const PARALLEL: bool>(tree: &Tree, ray: &PreparedRay, query: &mut Q) {
     unsafe {
         let nodes: *const Node = tree.nodes.as_ptr();
         let words: *const u32 = tree.leaves.words().as_ptr();
@@ -237,14 +254,29 @@ unsafe fn walk<L: Lanes, Q: Query>(tree: &Tree, ray: &PreparedRay, query: &mut Q
             } else {
                 let node = &*nodes.byte_add(current.number() << NODE_SHIFT);
                 let planes: *const f32 = node.planes.as_ptr().cast();
-                let mut first = near;
-                let mut last = L::splat(far);
+                let mut entries = [near; 3];
+                let mut exits = [near; 3];
                 for axis in 0..3 {
                     let entry = L::sub(origin[axis], L::load(planes.byte_add(enter[axis])));
                     let exit = L::sub(origin[axis], L::load(planes.byte_add(leave[axis])));
-                    first = L::greater(L::mul(entry, inverse[axis]), first);
-                    last = L::lesser(L::mul(exit, inverse_far[axis]), last);
+                    entries[axis] = L::mul(entry, inverse[axis]);
+                    exits[axis] = L::mul(exit, inverse_far[axis]);
                 }
+                let ([x, y, z], [u, v, w]) = (entries, exits);
+                let far_lanes = L::splat(far);
+                let (first, last) = if PARALLEL {
+                    // One by one, since a NaN must leave the running bound as it is.
+                    (
+                        L::greater(z, L::greater(y, L::greater(x, near))),
+                        L::lesser(w, L::lesser(v, L::lesser(u, far_lanes))),
+                    )
+                } else {
+                    // In pairs, which is sooner done.
+                    (
+                        L::greater(L::greater(x, y), L::greater(z, near)),
+                        L::lesser(L::lesser(u, v), L::lesser(w, far_lanes)),
+                    )
+                };
                 let mut crossed = L::at_most(first, last);
                 if crossed != 0 {
                     let children = node.children.as_ptr();
