@@ -97,7 +97,16 @@ impl Crossings {
 
     /// In ascending order.
     pub fn iter(&self) -> impl Iterator<Item = Crossing> + '_ {
-        self.list.iter().copied().map_while(|crossing| crossing)
+        self.into_iter()
+    }
+}
+
+impl IntoIterator for Crossings {
+    type Item = Crossing;
+    type IntoIter = std::iter::Flatten<std::array::IntoIter<Option<Crossing>, 4>>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.list.into_iter().flatten()
     }
 }
 

@@ -5,6 +5,7 @@ use std::ops::ControlFlow;
 
 use crate::accel::{BoxTree, Kind, Params, TreeStats, TriangleAccelerator};
 use crate::error::Result;
+use crate::geometry::ray::Interval;
 use crate::geometry::{Bounds, Hit, Key, PreparedRay, Quadric, Ray};
 use crate::progress::Progress;
 use crate::render::world::{Instance, World};
@@ -205,19 +206,50 @@ impl<A: TriangleAccelerator> TwoLevel<A> {
                 }
             }
             Shape::Quadric(_) if !compiled::QUADRICS => {}
-            Shape::Quadric(quadric) => {
-                let (origin, direction) = instance.local_line(ray.origin.as_dvec3(), ray.direction.as_dvec3());
-                for crossing in self.quadrics[quadric as usize].intersect_quadratic(origin, direction).iter() {
-                    let t = clip.clamp(crossing.t as f32) + 0.0;
-                    let hit = Hit { t, u: 0.0, v: 0.0, instance: number, primitive: crossing.surface };
-                    let in_range = t >= ray.t_min && t <= ray.t_max && t < f32::INFINITY;
-                    if in_range && after.is_none_or(|key| key.is_before(&hit.key())) && hit.key().is_before(&best.key())
-                    {
-                        *best = hit;
-                    }
-                }
+            Shape::Quadric(quadric) => self.meet_quadric(quadric, number, ray, clip, after, best),
+        }
+    }
+
+    /// Kept out of the search, which is smaller and faster without it where there are only meshes.
+    #[inline(never)]
+    fn meet_quadric(
+        &self,
+        quadric: u32,
+        number: u32,
+        ray: &PreparedRay,
+        clip: Interval,
+        after: Option<Key>,
+        best: &mut Hit,
+    ) {
+        for (t, primitive) in self.crossings(quadric, number, ray, clip) {
+            let hit = Hit { t, u: 0.0, v: 0.0, instance: number, primitive };
+            if after.is_none_or(|key| key.is_before(&hit.key())) && hit.key().is_before(&best.key()) {
+                *best = hit;
             }
         }
+    }
+
+    /// Where a ray meets a quadric, and on which of its surfaces.
+    #[inline]
+    fn crossings(
+        &self,
+        quadric: u32,
+        number: u32,
+        ray: &PreparedRay,
+        clip: Interval,
+    ) -> impl Iterator<Item = (f32, u32)> {
+        let instance = &self.world.instances[number as usize];
+        let (origin, direction) = instance.local_line(ray.origin.as_dvec3(), ray.direction.as_dvec3());
+        let (t_min, t_max) = (ray.t_min, ray.t_max);
+        let crossings = self.quadrics[quadric as usize].intersect_quadratic(origin, direction);
+        let crossings =
+            crossings.into_iter().map(move |crossing| (clip.clamp(crossing.t as f32) + 0.0, crossing.surface));
+        crossings.filter(move |&(t, _)| t >= t_min && t <= t_max && t < f32::INFINITY)
+    }
+
+    #[inline(never)]
+    fn quadric_blocks(&self, quadric: u32, number: u32, ray: &PreparedRay, clip: Interval) -> bool {
+        self.crossings(quadric, number, ray, clip).next().is_some()
     }
 
     #[inline]
@@ -265,13 +297,7 @@ impl<A: TriangleAccelerator> TwoLevel<A> {
                 instance.local_ray(ray, clip).is_some_and(|local| self.meshes[mesh as usize].occluded(&local))
             }
             Shape::Quadric(_) if !compiled::QUADRICS => false,
-            Shape::Quadric(quadric) => {
-                let (origin, direction) = instance.local_line(ray.origin.as_dvec3(), ray.direction.as_dvec3());
-                self.quadrics[quadric as usize].intersect_quadratic(origin, direction).iter().any(|crossing| {
-                    let t = clip.clamp(crossing.t as f32) + 0.0;
-                    t >= ray.t_min && t <= ray.t_max && t < f32::INFINITY
-                })
-            }
+            Shape::Quadric(quadric) => self.quadric_blocks(quadric, number, ray, clip),
         }
     }
 }
