@@ -11,7 +11,8 @@ use crate::accel::leaf::LeafTriangle;
 use crate::accel::topology::{self, Topology, half_area};
 use crate::geometry::Bounds;
 
-/// What a ray pays for a leaf, in visits of a node, whatever it holds: measured, see the notes of the runs.
+/// What a ray pays for a leaf, in visits of a node, whatever it holds. Rays on the bunny do not mind much: from 0.3 to 1 here and
+/// from 0 to 0.1 for a triangle all are within 3 %, but fuller leaves take less memory.
 const LEAF_COST: f32 = 0.8;
 
 /// What it pays for each triangle in it.
@@ -71,10 +72,11 @@ impl<'a> Collapse<'a> {
 
     /// Makes the nodes and leaves, depth first, and returns the root.
     pub fn run(&mut self) -> Child {
-        let Some(root) = self.source.first() else { return Child::NONE };
+        if self.source.is_empty() {
+            return Child::NONE;
+        }
         let mut pending = Vec::new();
         let child = self.child(0, 0, &mut pending);
-        debug_assert!(child.is_leaf() || root.count == 0);
         while let Some((at, part, depth)) = pending.pop() {
             let parts = self.split(&part, depth);
             let opened = pending.len();

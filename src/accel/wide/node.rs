@@ -63,7 +63,8 @@ impl Child {
     }
 }
 
-/// A node: eight boxes as arrays of planes, ready to be loaded into vectors. 224 bytes, never more than four cache lines.
+/// A node: eight boxes as arrays of planes, ready to be loaded into vectors. 256 bytes: four cache lines, and a number becomes
+/// an address by a shift.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(256))]
 pub struct Node {

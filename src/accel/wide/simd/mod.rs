@@ -7,9 +7,8 @@
 #![allow(unsafe_code)]
 
 #[cfg(target_arch = "x86_64")]
-mod avx2;
-#[cfg(target_arch = "x86_64")]
-mod avx512;
+mod avx;
+mod leaf;
 mod portable;
 mod single;
 
@@ -113,6 +112,6 @@ trait Lanes {
     /// A bit a lane: `a < b`.
     unsafe fn less(a: Self::Vector, b: Self::Vector) -> u32;
 
-    /// [`single::meet_leaf`] compiled for the set, and kept out of the loop over nodes, which needs the registers.
+    /// [`leaf::meet_leaf`] compiled for the set, and kept out of the loop over nodes, which needs the registers.
     unsafe fn meet_leaf<Q: Query>(words: *const u32, leaf: Child, ray: &PreparedRay, query: &mut Q) -> bool;
 }

@@ -1,7 +1,7 @@
 //! Eight lanes as an array: what every processor can do, and what the other sets are compared with.
 
 use super::single::Query;
-use super::{Lanes, single};
+use super::{Lanes, leaf};
 use crate::accel::wide::node::Child;
 use crate::geometry::PreparedRay;
 
@@ -81,6 +81,6 @@ impl Lanes for Portable {
     #[inline(never)]
     unsafe fn meet_leaf<Q: Query>(words: *const u32, leaf: Child, ray: &PreparedRay, query: &mut Q) -> bool {
         // SAFETY: as the caller promises.
-        unsafe { single::meet_leaf::<Self, Q>(words, leaf, ray, query) }
+        unsafe { leaf::meet_leaf::<Self, Q>(words, leaf, ray, query) }
     }
 }
