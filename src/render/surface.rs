@@ -3,7 +3,7 @@
 use glam::{DAffine3, DVec2, DVec3, Vec3};
 
 use crate::geometry::triangle::hit_bounds;
-use crate::geometry::{Bounds, Hit};
+use crate::geometry::{Bounds, Hit, Quadric};
 use crate::math::Transform;
 use crate::math::float::{gamma, round_down, round_up};
 use crate::math::vector::{cross, dot, length, normalize};
@@ -87,23 +87,29 @@ impl SurfacePoint {
             }
             Shape::Quadric(_) if !compiled::QUADRICS => unreachable!("this build has no quadrics"),
             Shape::Quadric(quadric) => {
-                let quadric = &scene.quadrics[quadric as usize];
-                let (origin, direction) = instance.local_line(ray.origin, ray.direction);
-                let point = quadric.point(origin, direction, hit.primitive);
-                let local = LocalPoint {
-                    position: point.position,
-                    face: point.normal,
-                    smooth: None,
-                    error: point.error,
-                    from_outside: point.from_outside,
-                    place: Place::Point(point.position),
-                };
-                Self::placed(instance, ray, local, material)
+                Self::on_quadric(&scene.quadrics[quadric as usize], instance, ray, hit, material)
             }
         }
     }
 
+    /// Kept out of the function above, which is smaller and faster without it where there are only meshes.
+    #[inline(never)]
+    fn on_quadric(quadric: &Quadric, instance: &Instance, ray: &ViewRay, hit: &Hit, material: u32) -> Self {
+        let (origin, direction) = instance.local_line(ray.origin, ray.direction);
+        let point = quadric.point(origin, direction, hit.primitive);
+        let local = LocalPoint {
+            position: point.position,
+            face: point.normal,
+            smooth: None,
+            error: point.error,
+            from_outside: point.from_outside,
+            place: Place::Point(point.position),
+        };
+        Self::placed(instance, ray, local, material)
+    }
+
     /// Brings a point with its normals and error into the world.
+    #[inline(always)]
     fn placed(instance: &Instance, ray: &ViewRay, local: LocalPoint, material: u32) -> Self {
         let LocalPoint { position, face, smooth, error, from_outside, place } = local;
         let against = -ray.direction;
