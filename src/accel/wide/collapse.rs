@@ -47,13 +47,12 @@ impl<'a> Collapse<'a> {
         let source = topology.nodes.as_slice();
         let mut costs = vec![[0.0; WIDTH - 1]; source.len()];
         let mut ranges = vec![(0, 0); source.len()];
-        let scale = source.first().map_or(0.0, |root| 1.0 / half_area(&root.bounds).max(f64::MIN_POSITIVE));
         for (number, node) in source.iter().enumerate().rev() {
-            let area = (half_area(&node.bounds) * scale) as f32;
+            let area = area(source, number);
             let first = node.first as usize;
             if node.is_leaf() {
                 ranges[number] = (node.first, node.first + node.count);
-                costs[number] = [area * (LEAF_COST + TRIANGLE_COST * node.count as f32); WIDTH - 1];
+                costs[number] = [leaf_cost(area, ranges[number]); WIDTH - 1];
                 continue;
             }
             ranges[number] = (ranges[first].0, ranges[first + 1].1);
@@ -97,10 +96,8 @@ impl<'a> Collapse<'a> {
     /// A leaf, or a node whose children are left for later.
     fn child(&mut self, number: usize, depth: usize, pending: &mut Vec<(usize, Part, usize)>) -> Child {
         let (first, end) = self.ranges[number];
-        let area_cost = self.costs[number][0];
         let is_leaf = self.source[number].is_leaf() || {
-            let area = self.area(number);
-            (end - first) as usize <= WIDTH && leaf_cost(area, (first, end)) <= area_cost
+            leaf_cost(area(self.source, number), (first, end)) <= self.costs[number][0]
         };
         if is_leaf || depth >= EVEN_DEPTH {
             return self.range(first, end, depth, pending);
@@ -153,11 +150,6 @@ impl<'a> Collapse<'a> {
         self.spend(first + 1, places - left, false, parts);
     }
 
-    fn area(&self, number: usize) -> f32 {
-        let scale = 1.0 / half_area(&self.source[0].bounds).max(f64::MIN_POSITIVE);
-        (half_area(&self.source[number].bounds) * scale) as f32
-    }
-
     fn bounds(&self, part: &Part) -> Bounds {
         match *part {
             Part::Subtree(number) => self.source[number].bounds,
@@ -175,6 +167,12 @@ enum Part {
     Subtree(usize),
     /// Triangles, without regard to the binary tree.
     Range(u32, u32),
+}
+
+/// The surface of a binary node's box in parts of the root's: how likely a random line through the root's meets it.
+fn area(source: &[topology::Node], number: usize) -> f32 {
+    let root = half_area(&source[0].bounds).max(f64::MIN_POSITIVE);
+    (half_area(&source[number].bounds) / root) as f32
 }
 
 /// The cost of all triangles below as one leaf; infinite if they are too many.
