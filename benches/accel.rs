@@ -5,7 +5,7 @@
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use glam::{Vec2, Vec3};
 use whitted::accel::{Kind, Linear, Params, Preset, TriangleAccelerator, dispatch_kind};
-use whitted::geometry::{Hit, PreparedRay, Ray, TriangleMesh};
+use whitted::geometry::{Hit, Ray, TriangleMesh};
 use whitted::math::random::{hash2, unit};
 use whitted::progress::Silent;
 
@@ -48,34 +48,34 @@ fn random(number: u32, salt: u32) -> Vec3 {
 }
 
 /// What a camera sends out, row by row.
-fn primary() -> Vec<PreparedRay> {
+fn primary() -> Vec<Ray> {
     const SIDE: u32 = 256;
     let (eye, right) = (Vec3::new(1.5, -2.5, 1.2), Vec3::new(2.5, 1.5, 0.0).normalize());
     let forward = -eye.normalize();
     let up = right.cross(forward);
     let offset = |i: u32| (i as f32 + 0.5) / SIDE as f32 - 0.5;
     let ray = |i: u32| Ray::new(eye, forward + (right * offset(i % SIDE) + up * offset(i / SIDE)) * 0.9);
-    (0..SIDE * SIDE).filter_map(|i| PreparedRay::new(&ray(i))).collect()
+    (0..SIDE * SIDE).map(ray).collect()
 }
 
 /// Rays from points on the mesh in all directions, none like the one before: what diffuse reflection sends out.
-fn scattered(mesh: &TriangleMesh) -> Vec<PreparedRay> {
+fn scattered(mesh: &TriangleMesh) -> Vec<Ray> {
     let ray = |i: u32| {
         let [a, b, c] = mesh.triangle(hash2(i, 99) % mesh.indices.len() as u32);
         Ray { t_min: 1e-3, ..Ray::new((a + b + c) / 3.0, random(i, 5)) }
     };
-    (0..65_536).filter_map(|i| PreparedRay::new(&ray(i))).collect()
+    (0..65_536).map(ray).collect()
 }
 
-fn closest<A: TriangleAccelerator>(accelerator: &A, rays: &[PreparedRay]) -> Vec<Hit> {
+fn closest<A: TriangleAccelerator>(accelerator: &A, rays: &[Ray]) -> Vec<Hit> {
     let mut hits = vec![Hit::MISS; rays.len()];
-    accelerator.closest_batch(rays, 0, &mut hits);
+    accelerator.closest_batch(rays, &[], 0, &mut hits);
     hits
 }
 
-fn occluded<A: TriangleAccelerator>(accelerator: &A, rays: &[PreparedRay]) -> Vec<bool> {
+fn occluded<A: TriangleAccelerator>(accelerator: &A, rays: &[Ray]) -> Vec<bool> {
     let mut occluded = vec![false; rays.len()];
-    accelerator.occluded_batch(rays, &mut occluded);
+    accelerator.occluded_batch(rays, &[], &mut occluded);
     occluded
 }
 

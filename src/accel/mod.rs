@@ -41,6 +41,7 @@ pub(crate) use topology::{Node, Topology};
 pub use wide::Wide;
 
 use crate::error::Result;
+use crate::geometry::ray::Interval;
 use crate::geometry::{Bounds, Hit, Key, PreparedRay, Ray, TriangleMesh};
 use crate::progress::Progress;
 
@@ -195,20 +196,29 @@ pub trait TriangleAccelerator: Sized + Send + Sync {
         PreparedRay::new(ray).is_some_and(|ray| self.occluded(&ray))
     }
 
-    /// [`closest`](Self::closest) for each ray and the hit at the same position; the slices have equal lengths.
-    fn closest_batch(&self, rays: &[PreparedRay], instance: u32, best: &mut [Hit]) {
-        debug_assert_eq!(rays.len(), best.len());
-        for (ray, best) in rays.iter().zip(best) {
-            self.closest(ray, instance, best);
+    /// [`closest`](Self::closest) for each ray and the hit at the same position. `clips` are the rays' clip intervals, or
+    /// empty for rays in world space.
+    ///
+    /// # Panics
+    /// If the slices have different lengths.
+    fn closest_batch(&self, rays: &[Ray], clips: &[Interval], instance: u32, best: &mut [Hit]) {
+        assert!(rays.len() == best.len() && (clips.is_empty() || clips.len() == rays.len()), "one of each a ray");
+        for (at, (ray, best)) in rays.iter().zip(best).enumerate() {
+            if let Some(ray) = PreparedRay::clipped(ray, clips.get(at)) {
+                self.closest(&ray, instance, best);
+            }
         }
     }
 
-    /// Sets the flags of those rays that are [`occluded`](Self::occluded); the slices have equal lengths. Rays whose
-    /// flag is set already are left out.
-    fn occluded_batch(&self, rays: &[PreparedRay], occluded: &mut [bool]) {
-        debug_assert_eq!(rays.len(), occluded.len());
-        for (ray, occluded) in rays.iter().zip(occluded) {
-            *occluded = *occluded || self.occluded(ray);
+    /// Sets the flags of those rays that are [`occluded`](Self::occluded); as [`closest_batch`](Self::closest_batch). Rays
+    /// whose flag is set already are left out.
+    ///
+    /// # Panics
+    /// If the slices have different lengths.
+    fn occluded_batch(&self, rays: &[Ray], clips: &[Interval], occluded: &mut [bool]) {
+        assert!(rays.len() == occluded.len() && (clips.is_empty() || clips.len() == rays.len()), "one of each a ray");
+        for (at, (ray, occluded)) in rays.iter().zip(occluded).enumerate().filter(|(_, (_, occluded))| !**occluded) {
+            *occluded = PreparedRay::clipped(ray, clips.get(at)).is_some_and(|ray| self.occluded(&ray));
         }
     }
 

@@ -46,6 +46,7 @@ impl Ray {
 
 /// The part of a ray inside something, as the ends of an interval of t; empty if `near > far`.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[repr(C)]
 pub struct Interval {
     /// Where the ray enters.
     pub near: f32,
@@ -105,6 +106,14 @@ impl PreparedRay {
         ray.is_valid().then(|| Self::with_clip(origin, direction, ray.t_min, ray.t_max, Interval::ALL))
     }
 
+    /// Prepares a ray with its clip interval, if it has one; `None` if it can meet nothing.
+    #[inline(always)]
+    pub fn clipped(ray: &Ray, clip: Option<&Interval>) -> Option<Self> {
+        let [origin, direction] = ray.halves().map(Vec3A::from_vec4);
+        let clip = clip.copied().unwrap_or(Interval::ALL);
+        ray.is_valid().then(|| Self::with_clip(origin, direction, ray.t_min, ray.t_max, clip))
+    }
+
     /// Prepares a ray that was brought into an instance's space; `None` if rounding left it without a direction.
     #[inline]
     pub fn local(origin: Vec3, direction: Vec3, world: &Self, clip: Interval) -> Option<Self> {
@@ -115,19 +124,16 @@ impl PreparedRay {
     #[inline(always)]
     fn with_clip(origin: Vec3A, direction: Vec3A, t_min: f32, t_max: f32, clip: Interval) -> Self {
         let inverse = Vec3A::ONE / direction;
-        let [x, y, z] = direction.abs().to_array();
-        // The largest component becomes z, without branches, which random directions would mislead. Woop et al. swap x and
-        // y for negative z to keep the winding; both sides count here, so the order stays cyclic and only the sign of the
-        // determinant changes.
-        let larger = if x > y { x } else { y };
-        let largest = if larger > z { usize::from(x <= y) } else { 2 };
+        // The largest component becomes z. Woop et al. swap x and y for negative z to keep the winding; both sides count here,
+        // so the order stays cyclic and only the sign of the determinant changes.
+        let largest = largest_axis(direction.abs().to_array());
         let axes = AXES[largest];
         let d = direction.to_array();
         Self {
             origin,
             direction,
             inverse,
-            inverse_far: padded(inverse),
+            inverse_far: Vec3A::from_array(inverse.to_array().map(padded)),
             shear: Vec3A::new(d[axes[0]], d[axes[1]], 1.0) / Vec3A::splat(d[largest]),
             axes,
             signs: direction.is_negative_bitmask(),
@@ -181,20 +187,24 @@ impl PreparedRay {
 /// [`hit_bounds`](crate::geometry::triangle::hit_bounds).
 pub const PADDING: u32 = 12;
 
-/// The values [`PADDING`] ulp farther from zero; infinities stay.
+/// The value [`PADDING`] ulp farther from zero; infinities stay.
 #[inline(always)]
-fn padded(v: Vec3A) -> Vec3A {
+pub fn padded(x: f32) -> f32 {
     const INFINITY_BITS: u32 = f32::INFINITY.to_bits();
-    let farther = |x: f32| {
-        let sign = x.to_bits() & 0x8000_0000;
-        let magnitude = (x.to_bits() & 0x7fff_ffff) + PADDING;
-        f32::from_bits(sign | if magnitude < INFINITY_BITS { magnitude } else { INFINITY_BITS })
-    };
-    Vec3A::from_array(v.to_array().map(farther))
+    let sign = x.to_bits() & 0x8000_0000;
+    let magnitude = (x.to_bits() & 0x7fff_ffff) + PADDING;
+    f32::from_bits(sign | if magnitude < INFINITY_BITS { magnitude } else { INFINITY_BITS })
 }
 
 /// The cyclic orders of axes by their last one.
-const AXES: [[usize; 3]; 3] = [[1, 2, 0], [2, 0, 1], [0, 1, 2]];
+pub const AXES: [[usize; 3]; 3] = [[1, 2, 0], [2, 0, 1], [0, 1, 2]];
+
+/// Which component of a direction's magnitudes is the largest, without branches, which random directions would mislead.
+#[inline(always)]
+pub fn largest_axis([x, y, z]: [f32; 3]) -> usize {
+    let larger = if x > y { x } else { y };
+    if larger > z { usize::from(x <= y) } else { 2 }
+}
 
 #[cfg(test)]
 mod tests {
@@ -220,7 +230,6 @@ mod tests {
 
     #[test]
     fn the_padded_inverse_is_farther_out_and_keeps_infinities() {
-        let padded = |x: f32| padded(Vec3A::splat(x)).x;
         assert_eq!(padded(1.0), 1.0 + 12.0 * f32::EPSILON);
         assert_eq!(padded(-1.0), -1.0 - 12.0 * f32::EPSILON);
         assert_eq!(padded(f32::INFINITY), f32::INFINITY);

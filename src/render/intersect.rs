@@ -319,6 +319,28 @@ impl<A: TriangleAccelerator> Intersect for TwoLevel<A> {
         PreparedRay::new(ray).is_some_and(|ray| self.any::<Everything>(&ray))
     }
 
+    fn closest_batch(&self, rays: &[Ray], hits: &mut [Hit]) {
+        assert_eq!(rays.len(), hits.len(), "one hit a ray");
+        if let Top::Single = self.top {
+            hits.fill(Hit::MISS);
+            return self.meshes[0].closest_batch(rays, &[], 0, hits);
+        }
+        for (ray, hit) in rays.iter().zip(hits) {
+            *hit = self.closest(ray);
+        }
+    }
+
+    fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool]) {
+        assert_eq!(rays.len(), occluded.len(), "one answer a ray");
+        if let Top::Single = self.top {
+            occluded.fill(false);
+            return self.meshes[0].occluded_batch(rays, &[], occluded);
+        }
+        for (ray, occluded) in rays.iter().zip(occluded) {
+            *occluded = self.occluded(ray);
+        }
+    }
+
     fn occluded_by_opaque(&self, ray: &Ray) -> bool {
         PreparedRay::new(ray).is_some_and(|ray| self.any::<Opaque>(&ray))
     }

@@ -110,7 +110,42 @@ fn answers<A: TriangleAccelerator>(
     accelerator.validate().unwrap_or_else(|violation| panic!("{} {preset:?}: {violation}", A::NAME));
     assert_eq!(accelerator.bounds(), mesh.hit_bounds(), "{}", A::NAME);
     assert_eq!(accelerator.stats().triangles, mesh.live_count() as u64, "{}", A::NAME);
-    (rays.iter().map(|ray| answer(&accelerator, ray)).collect(), accelerator.stats())
+    let answers: Vec<Answer> = rays.iter().map(|ray| answer(&accelerator, ray)).collect();
+    check_batches(&accelerator, rays, &answers);
+    (answers, accelerator.stats())
+}
+
+/// Batches must give what single rays do, from nothing and from what is known already.
+fn check_batches<A: TriangleAccelerator>(accelerator: &A, rays: &[PreparedRay], answers: &[Answer]) {
+    let clips: Vec<Interval> = rays.iter().map(|ray| ray.clip).collect();
+    let rays: Vec<Ray> = rays
+        .iter()
+        .map(|ray| Ray {
+            origin: ray.origin.into(),
+            t_min: ray.t_min,
+            direction: ray.direction.into(),
+            t_max: ray.t_max,
+        })
+        .collect();
+    let mut hits = vec![Hit::MISS; rays.len()];
+    accelerator.closest_batch(&rays, &clips, INSTANCE, &mut hits);
+    // A flag that is set stays so.
+    let mut occluded: Vec<bool> = (0..rays.len()).map(|number| number % 7 == 0).collect();
+    accelerator.occluded_batch(&rays, &clips, &mut occluded);
+    for (number, ((ray, answer), (hit, occluded))) in
+        rays.iter().zip(answers).zip(hits.iter().zip(occluded)).enumerate()
+    {
+        assert_eq!(bytemuck::bytes_of(hit), answer.closest, "{} {ray:?} in a batch", A::NAME);
+        assert_eq!(occluded, answer.occluded || number % 7 == 0, "{} {ray:?} in a batch", A::NAME);
+    }
+    let mut again = hits.clone();
+    accelerator.closest_batch(&rays, &clips, INSTANCE + 1, &mut again);
+    assert_eq!(again, hits, "{}: ties go to the first instance", A::NAME);
+    accelerator.closest_batch(&rays, &clips, INSTANCE - 1, &mut again);
+    for (hit, again) in hits.iter().zip(&again) {
+        let expected = if hit.is_hit() { Hit { instance: INSTANCE - 1, ..*hit } } else { *hit };
+        assert_eq!(bytemuck::bytes_of(again), bytemuck::bytes_of(&expected), "{}", A::NAME);
+    }
 }
 
 /// Compares all structures and presets with `linear`; returns how many rays hit.

@@ -21,6 +21,7 @@ use super::leaf::{LeafTriangle, check_distinct, check_partition};
 use super::topology::{Topology, half_area};
 use super::{Params, TreeStats, TriangleAccelerator};
 use crate::error::{Error, Result};
+use crate::geometry::ray::Interval;
 use crate::geometry::triangle::hit_bounds;
 use crate::geometry::{Bounds, Hit, Key, PreparedRay, Ray, TriangleMesh};
 use crate::progress::{Progress, Share};
@@ -103,6 +104,16 @@ impl TriangleAccelerator for Wide {
 
     fn next_after(&self, ray: &PreparedRay, instance: u32, key: Key, best: &mut Hit) {
         simd::search(self.level, &self.tree, ray, &mut NextAfter { key, closest: Closest { instance, best } });
+    }
+
+    #[inline(always)]
+    fn closest_batch(&self, rays: &[Ray], clips: &[Interval], instance: u32, best: &mut [Hit]) {
+        simd::closest_batch(self.level, &self.tree, rays, clips, instance, best);
+    }
+
+    #[inline(always)]
+    fn occluded_batch(&self, rays: &[Ray], clips: &[Interval], occluded: &mut [bool]) {
+        simd::occluded_batch(self.level, &self.tree, rays, clips, occluded);
     }
 
     fn stats(&self) -> TreeStats {

@@ -99,3 +99,9 @@ impl Node {
         (0..WIDTH).map(|at| (self.children[at], self.bounds(at))).filter(|(child, _)| *child != Child::NONE)
     }
 }
+
+/// A node's bytes, as a power of two.
+pub const NODE_SHIFT: u32 = size_of::<Node>().trailing_zeros();
+
+/// A plane of all children.
+pub const PLANE_BYTES: usize = WIDTH * size_of::<f32>();

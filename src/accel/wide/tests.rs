@@ -86,6 +86,60 @@ fn all_instruction_sets_give_the_hits_of_the_reference() {
     }
 }
 
+/// Rays from about one place to about another.
+fn bundles(count: usize, random: &mut Random) -> Vec<Ray> {
+    let mut bundles = Vec::new();
+    while bundles.len() < count {
+        let (origin, target, spread) = (random.in_cube() * 2.0, random.in_cube(), random.unit() * 0.3);
+        bundles.extend((0..20).map(|number| {
+            let start = origin + random.in_cube() * (spread * 0.1);
+            let ray = Ray::new(start.as_vec3(), (target + random.in_cube() * spread - start).as_vec3());
+            if number % 3 == 0 { Ray { t_min: 0.2, t_max: 1.0, ..ray } } else { ray }
+        }));
+    }
+    bundles
+}
+
+#[test]
+fn packets_give_the_hits_of_the_reference() {
+    let mut random = Random::new(15, 0x51d);
+    for count in [1, 3, 8, 40, 3000] {
+        let mesh = confetti(count, if count > 100 { 0.2 } else { 0.7 }, &mut random);
+        let params = Params { kind: Kind::Wide, ..Params::default() };
+        let linear = Linear::build(&mesh, &params, &Silent).unwrap();
+        let mut asked = bundles(700, &mut random);
+        asked.extend(rays(1300, &mut random));
+        let clips: Vec<_> = asked
+            .iter()
+            .enumerate()
+            .map(|(number, ray)| prepared(ray, number).map_or(Interval::ALL, |ray| ray.clip))
+            .collect();
+        for clips in [&[][..], &clips] {
+            let mut expected = vec![Hit::MISS; asked.len()];
+            linear.closest_batch(&asked, clips, 3, &mut expected);
+            assert!(expected.iter().filter(|hit| hit.is_hit()).count() > count.min(300), "{} hits of {count} triangles", expected.iter().filter(|hit| hit.is_hit()).count());
+            for level in Level::available() {
+                let wide = Wide::build(&mesh, &params, &Silent).unwrap().with_level(level);
+                // Whole packets, and what is left over.
+                for size in [asked.len(), 16, 21] {
+                    let mut hits = vec![Hit::MISS; asked.len()];
+                    let mut occluded = vec![false; asked.len()];
+                    for (at, rays) in asked.chunks(size).enumerate() {
+                        let part = at * size..at * size + rays.len();
+                        let clips = if clips.is_empty() { clips } else { &clips[part.clone()] };
+                        wide.closest_batch(rays, clips, 3, &mut hits[part.clone()]);
+                        wide.occluded_batch(rays, clips, &mut occluded[part]);
+                    }
+                    for (((ray, expected), hit), occluded) in asked.iter().zip(&expected).zip(&hits).zip(occluded) {
+                        assert_eq!(bytemuck::bytes_of(hit), bytemuck::bytes_of(expected), "{} {ray:?}", level.name());
+                        assert_eq!(occluded, expected.is_hit(), "{} {ray:?}", level.name());
+                    }
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn nested_triangles_make_a_tree_of_bounded_depth() {
     // Each encloses all before it: binary trees become chains.

@@ -3,7 +3,7 @@
 use std::arch::x86_64::*;
 
 use super::single::Query;
-use super::{Lanes, leaf};
+use super::{Lanes, Rows, leaf};
 use crate::accel::wide::node::Child;
 use crate::geometry::PreparedRay;
 
@@ -97,3 +97,325 @@ lanes_of_256_bits!(
     |a, b| u32::from(_mm256_cmp_ps_mask::<_CMP_LE_OQ>(a, b)),
     u32::from(_mm256_cmp_ps_mask::<_CMP_LT_OQ>(a, b))
 );
+
+// SAFETY, of each block: as above.
+impl Rows for Avx512 {
+    type Row = __m512;
+    type Double = __m512d;
+
+    #[inline(always)]
+    unsafe fn row(x: f32) -> __m512 {
+        unsafe { _mm512_set1_ps(x) }
+    }
+
+    #[inline(always)]
+    unsafe fn row_gather<const N: usize>(records: *const f32, places: &[i32; 16], size: i32) -> [__m512; N] {
+        unsafe {
+            let words = _mm512_mullo_epi32(_mm512_loadu_si512(places.as_ptr().cast()), _mm512_set1_epi32(size));
+            let mut rows = [_mm512_setzero_ps(); N];
+            for (word, row) in rows.iter_mut().enumerate() {
+                *row = _mm512_i32gather_ps::<4>(words, records.add(word));
+            }
+            rows
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn row_div(a: __m512, b: __m512) -> __m512 {
+        unsafe { _mm512_div_ps(a, b) }
+    }
+
+    #[inline(always)]
+    unsafe fn row_farther(a: __m512, steps: u32) -> __m512 {
+        unsafe { _mm512_castsi512_ps(_mm512_add_epi32(_mm512_castps_si512(a), _mm512_set1_epi32(steps as i32))) }
+    }
+
+    #[inline(always)]
+    unsafe fn row_ends(a: __m512) -> [f32; 2] {
+        unsafe { [_mm512_reduce_min_ps(a), _mm512_reduce_max_ps(a)] }
+    }
+
+    #[inline(always)]
+    unsafe fn row_sub(a: __m512, b: __m512) -> __m512 {
+        unsafe { _mm512_sub_ps(a, b) }
+    }
+
+    #[inline(always)]
+    unsafe fn row_mul(a: __m512, b: __m512) -> __m512 {
+        unsafe { _mm512_mul_ps(a, b) }
+    }
+
+    #[inline(always)]
+    unsafe fn row_add(a: __m512, b: __m512) -> __m512 {
+        unsafe { _mm512_add_ps(a, b) }
+    }
+
+    #[inline(always)]
+    unsafe fn row_greater(a: __m512, b: __m512) -> __m512 {
+        unsafe { _mm512_max_ps(a, b) }
+    }
+
+    #[inline(always)]
+    unsafe fn row_lesser(a: __m512, b: __m512) -> __m512 {
+        unsafe { _mm512_min_ps(a, b) }
+    }
+
+    #[inline(always)]
+    unsafe fn row_at_most(a: __m512, b: __m512) -> u32 {
+        unsafe { u32::from(_mm512_cmp_ps_mask::<_CMP_LE_OQ>(a, b)) }
+    }
+
+    #[inline(always)]
+    unsafe fn row_less(a: __m512, b: __m512) -> u32 {
+        unsafe { u32::from(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, b)) }
+    }
+
+    #[inline(always)]
+    unsafe fn row_select(bits: u32, a: __m512, b: __m512) -> __m512 {
+        unsafe { _mm512_mask_mov_ps(a, bits as u16, b) }
+    }
+
+    #[inline(always)]
+    unsafe fn half(row: __m512, last: bool) -> __m256 {
+        unsafe { if last { _mm512_extractf32x8_ps::<1>(row) } else { _mm512_castps512_ps256(row) } }
+    }
+
+    #[inline(always)]
+    unsafe fn join(first: __m256, last: __m256) -> __m512 {
+        unsafe { _mm512_insertf32x8::<1>(_mm512_castps256_ps512(first), last) }
+    }
+
+    #[inline(always)]
+    unsafe fn widen(v: __m256) -> __m512d {
+        unsafe { _mm512_cvtps_pd(v) }
+    }
+
+    #[inline(always)]
+    unsafe fn narrow(v: __m512d) -> __m256 {
+        unsafe { _mm512_cvtpd_ps(v) }
+    }
+
+    #[inline(always)]
+    unsafe fn double(x: f64) -> __m512d {
+        unsafe { _mm512_set1_pd(x) }
+    }
+
+    #[inline(always)]
+    unsafe fn double_sub(a: __m512d, b: __m512d) -> __m512d {
+        unsafe { _mm512_sub_pd(a, b) }
+    }
+
+    #[inline(always)]
+    unsafe fn double_mul(a: __m512d, b: __m512d) -> __m512d {
+        unsafe { _mm512_mul_pd(a, b) }
+    }
+
+    #[inline(always)]
+    unsafe fn double_add(a: __m512d, b: __m512d) -> __m512d {
+        unsafe { _mm512_add_pd(a, b) }
+    }
+
+    #[inline(always)]
+    unsafe fn double_div(a: __m512d, b: __m512d) -> __m512d {
+        unsafe { _mm512_div_pd(a, b) }
+    }
+
+    #[inline(always)]
+    unsafe fn double_greater(a: __m512d, b: __m512d) -> __m512d {
+        unsafe { _mm512_max_pd(a, b) }
+    }
+
+    #[inline(always)]
+    unsafe fn double_lesser(a: __m512d, b: __m512d) -> __m512d {
+        unsafe { _mm512_min_pd(a, b) }
+    }
+
+    #[inline(always)]
+    unsafe fn double_select(bits: u32, a: __m512d, b: __m512d) -> __m512d {
+        unsafe { _mm512_mask_mov_pd(a, bits as u8, b) }
+    }
+
+    #[inline(always)]
+    unsafe fn double_less(a: __m512d, b: __m512d) -> u32 {
+        unsafe { u32::from(_mm512_cmp_pd_mask::<_CMP_LT_OQ>(a, b)) }
+    }
+}
+
+// SAFETY, of each block: as above.
+impl Rows for Avx2 {
+    type Row = [__m256; 2];
+    type Double = [__m256d; 2];
+
+    #[inline(always)]
+    unsafe fn row(x: f32) -> [__m256; 2] {
+        unsafe { [_mm256_set1_ps(x); 2] }
+    }
+
+    #[inline(always)]
+    unsafe fn row_gather<const N: usize>(records: *const f32, places: &[i32; 16], size: i32) -> [[__m256; 2]; N] {
+        unsafe {
+            let places: *const __m256i = places.as_ptr().cast();
+            let size = _mm256_set1_epi32(size);
+            let first = _mm256_mullo_epi32(_mm256_loadu_si256(places), size);
+            let last = _mm256_mullo_epi32(_mm256_loadu_si256(places.add(1)), size);
+            let mut rows = [[_mm256_setzero_ps(); 2]; N];
+            for (word, row) in rows.iter_mut().enumerate() {
+                let records = records.add(word);
+                *row = [_mm256_i32gather_ps::<4>(records, first), _mm256_i32gather_ps::<4>(records, last)];
+            }
+            rows
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn row_div(a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
+        unsafe { [_mm256_div_ps(a[0], b[0]), _mm256_div_ps(a[1], b[1])] }
+    }
+
+    #[inline(always)]
+    unsafe fn row_farther(a: [__m256; 2], steps: u32) -> [__m256; 2] {
+        unsafe {
+            let steps = _mm256_set1_epi32(steps as i32);
+            let first = _mm256_add_epi32(_mm256_castps_si256(a[0]), steps);
+            let last = _mm256_add_epi32(_mm256_castps_si256(a[1]), steps);
+            [_mm256_castsi256_ps(first), _mm256_castsi256_ps(last)]
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn row_ends([first, last]: [__m256; 2]) -> [f32; 2] {
+        unsafe {
+            let (least, most) = (_mm256_min_ps(first, last), _mm256_max_ps(first, last));
+            let least = _mm_min_ps(_mm256_castps256_ps128(least), _mm256_extractf128_ps::<1>(least));
+            let most = _mm_max_ps(_mm256_castps256_ps128(most), _mm256_extractf128_ps::<1>(most));
+            let least = _mm_min_ps(least, _mm_movehl_ps(least, least));
+            let most = _mm_max_ps(most, _mm_movehl_ps(most, most));
+            let least = _mm_min_ss(least, _mm_shuffle_ps::<1>(least, least));
+            let most = _mm_max_ss(most, _mm_shuffle_ps::<1>(most, most));
+            [_mm_cvtss_f32(least), _mm_cvtss_f32(most)]
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn row_sub(a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
+        unsafe { [_mm256_sub_ps(a[0], b[0]), _mm256_sub_ps(a[1], b[1])] }
+    }
+
+    #[inline(always)]
+    unsafe fn row_mul(a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
+        unsafe { [_mm256_mul_ps(a[0], b[0]), _mm256_mul_ps(a[1], b[1])] }
+    }
+
+    #[inline(always)]
+    unsafe fn row_add(a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
+        unsafe { [_mm256_add_ps(a[0], b[0]), _mm256_add_ps(a[1], b[1])] }
+    }
+
+    #[inline(always)]
+    unsafe fn row_greater(a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
+        unsafe { [_mm256_max_ps(a[0], b[0]), _mm256_max_ps(a[1], b[1])] }
+    }
+
+    #[inline(always)]
+    unsafe fn row_lesser(a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
+        unsafe { [_mm256_min_ps(a[0], b[0]), _mm256_min_ps(a[1], b[1])] }
+    }
+
+    #[inline(always)]
+    unsafe fn row_at_most(a: [__m256; 2], b: [__m256; 2]) -> u32 {
+        unsafe { Self::at_most(a[0], b[0]) | Self::at_most(a[1], b[1]) << 8 }
+    }
+
+    #[inline(always)]
+    unsafe fn row_less(a: [__m256; 2], b: [__m256; 2]) -> u32 {
+        unsafe { Self::less(a[0], b[0]) | Self::less(a[1], b[1]) << 8 }
+    }
+
+    #[inline(always)]
+    unsafe fn row_select(bits: u32, a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
+        unsafe {
+            let lanes = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+            let first = _mm256_and_si256(_mm256_set1_epi32(bits as i32), lanes);
+            let last = _mm256_and_si256(_mm256_set1_epi32((bits >> 8) as i32), lanes);
+            let first = _mm256_castsi256_ps(_mm256_cmpeq_epi32(first, lanes));
+            let last = _mm256_castsi256_ps(_mm256_cmpeq_epi32(last, lanes));
+            [_mm256_blendv_ps(a[0], b[0], first), _mm256_blendv_ps(a[1], b[1], last)]
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn half(row: [__m256; 2], last: bool) -> __m256 {
+        row[usize::from(last)]
+    }
+
+    #[inline(always)]
+    unsafe fn join(first: __m256, last: __m256) -> [__m256; 2] {
+        [first, last]
+    }
+
+    #[inline(always)]
+    unsafe fn widen(v: __m256) -> [__m256d; 2] {
+        unsafe { [_mm256_cvtps_pd(_mm256_castps256_ps128(v)), _mm256_cvtps_pd(_mm256_extractf128_ps::<1>(v))] }
+    }
+
+    #[inline(always)]
+    unsafe fn narrow(v: [__m256d; 2]) -> __m256 {
+        unsafe { _mm256_set_m128(_mm256_cvtpd_ps(v[1]), _mm256_cvtpd_ps(v[0])) }
+    }
+
+    #[inline(always)]
+    unsafe fn double(x: f64) -> [__m256d; 2] {
+        unsafe { [_mm256_set1_pd(x); 2] }
+    }
+
+    #[inline(always)]
+    unsafe fn double_sub(a: [__m256d; 2], b: [__m256d; 2]) -> [__m256d; 2] {
+        unsafe { [_mm256_sub_pd(a[0], b[0]), _mm256_sub_pd(a[1], b[1])] }
+    }
+
+    #[inline(always)]
+    unsafe fn double_mul(a: [__m256d; 2], b: [__m256d; 2]) -> [__m256d; 2] {
+        unsafe { [_mm256_mul_pd(a[0], b[0]), _mm256_mul_pd(a[1], b[1])] }
+    }
+
+    #[inline(always)]
+    unsafe fn double_add(a: [__m256d; 2], b: [__m256d; 2]) -> [__m256d; 2] {
+        unsafe { [_mm256_add_pd(a[0], b[0]), _mm256_add_pd(a[1], b[1])] }
+    }
+
+    #[inline(always)]
+    unsafe fn double_div(a: [__m256d; 2], b: [__m256d; 2]) -> [__m256d; 2] {
+        unsafe { [_mm256_div_pd(a[0], b[0]), _mm256_div_pd(a[1], b[1])] }
+    }
+
+    #[inline(always)]
+    unsafe fn double_greater(a: [__m256d; 2], b: [__m256d; 2]) -> [__m256d; 2] {
+        unsafe { [_mm256_max_pd(a[0], b[0]), _mm256_max_pd(a[1], b[1])] }
+    }
+
+    #[inline(always)]
+    unsafe fn double_lesser(a: [__m256d; 2], b: [__m256d; 2]) -> [__m256d; 2] {
+        unsafe { [_mm256_min_pd(a[0], b[0]), _mm256_min_pd(a[1], b[1])] }
+    }
+
+    #[inline(always)]
+    unsafe fn double_select(bits: u32, a: [__m256d; 2], b: [__m256d; 2]) -> [__m256d; 2] {
+        unsafe {
+            let lanes = _mm256_setr_epi64x(1, 2, 4, 8);
+            let first = _mm256_and_si256(_mm256_set1_epi64x(i64::from(bits)), lanes);
+            let last = _mm256_and_si256(_mm256_set1_epi64x(i64::from(bits >> 4)), lanes);
+            let first = _mm256_castsi256_pd(_mm256_cmpeq_epi64(first, lanes));
+            let last = _mm256_castsi256_pd(_mm256_cmpeq_epi64(last, lanes));
+            [_mm256_blendv_pd(a[0], b[0], first), _mm256_blendv_pd(a[1], b[1], last)]
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn double_less(a: [__m256d; 2], b: [__m256d; 2]) -> u32 {
+        unsafe {
+            let first = _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(a[0], b[0])) as u32;
+            let last = _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(a[1], b[1])) as u32;
+            first | last << 4
+        }
+    }
+}

@@ -8,10 +8,14 @@
 
 #[cfg(target_arch = "x86_64")]
 mod avx;
+mod batch;
 mod leaf;
+mod packet;
+mod packet_leaf;
 mod portable;
 mod single;
 
+pub use batch::{closest_batch, occluded_batch};
 pub use single::{Closest, NextAfter, Occluded, search, search_alone};
 
 use std::sync::OnceLock;
@@ -114,4 +118,69 @@ trait Lanes {
 
     /// [`leaf::meet_leaf`] compiled for the set, and kept out of the loop over nodes, which needs the registers.
     unsafe fn meet_leaf<Q: Query>(words: *const u32, leaf: Child, ray: &PreparedRay, query: &mut Q) -> bool;
+}
+
+/// Sixteen f32 in rows, a lane a ray of a packet, and eight f64 at a time for what decides hits.
+///
+/// # Safety
+/// As for [`Lanes`].
+trait Rows: Lanes {
+    /// Sixteen numbers.
+    type Row: Copy;
+    /// Eight f64.
+    type Double: Copy;
+
+    /// The same number sixteen times.
+    unsafe fn row(x: f32) -> Self::Row;
+    /// The first N words of sixteen records, a row a word: those at `places`, each of `size` words.
+    unsafe fn row_gather<const N: usize>(records: *const f32, places: &[i32; 16], size: i32) -> [Self::Row; N];
+    /// `a - b`
+    unsafe fn row_sub(a: Self::Row, b: Self::Row) -> Self::Row;
+    /// `a b`
+    unsafe fn row_mul(a: Self::Row, b: Self::Row) -> Self::Row;
+    /// `a + b`
+    unsafe fn row_add(a: Self::Row, b: Self::Row) -> Self::Row;
+    /// `a / b`
+    unsafe fn row_div(a: Self::Row, b: Self::Row) -> Self::Row;
+    /// So many representable numbers farther from zero; not for what would become infinite.
+    unsafe fn row_farther(a: Self::Row, steps: u32) -> Self::Row;
+    /// The least and the largest number; none is NaN.
+    unsafe fn row_ends(a: Self::Row) -> [f32; 2];
+    /// `if a > b { a } else { b }`: b where either is NaN.
+    unsafe fn row_greater(a: Self::Row, b: Self::Row) -> Self::Row;
+    /// `if a < b { a } else { b }`: b where either is NaN.
+    unsafe fn row_lesser(a: Self::Row, b: Self::Row) -> Self::Row;
+    /// A bit a lane: `a <= b`.
+    unsafe fn row_at_most(a: Self::Row, b: Self::Row) -> u32;
+    /// A bit a lane: `a < b`.
+    unsafe fn row_less(a: Self::Row, b: Self::Row) -> u32;
+    /// `b` where a lane's bit is set, else `a`; bits are passed on as they are.
+    unsafe fn row_select(bits: u32, a: Self::Row, b: Self::Row) -> Self::Row;
+    /// The first eight lanes, or the last.
+    unsafe fn half(row: Self::Row, last: bool) -> Self::Vector;
+    /// Both halves.
+    unsafe fn join(first: Self::Vector, last: Self::Vector) -> Self::Row;
+
+    /// The same numbers in f64.
+    unsafe fn widen(v: Self::Vector) -> Self::Double;
+    /// Rounded to the nearest f32, ties to even.
+    unsafe fn narrow(v: Self::Double) -> Self::Vector;
+    /// The same number eight times.
+    unsafe fn double(x: f64) -> Self::Double;
+    /// `a - b`
+    unsafe fn double_sub(a: Self::Double, b: Self::Double) -> Self::Double;
+    /// `a b`
+    unsafe fn double_mul(a: Self::Double, b: Self::Double) -> Self::Double;
+    /// `a + b`
+    unsafe fn double_add(a: Self::Double, b: Self::Double) -> Self::Double;
+    /// `a / b`
+    unsafe fn double_div(a: Self::Double, b: Self::Double) -> Self::Double;
+    /// `if a > b { a } else { b }`: b where either is NaN.
+    unsafe fn double_greater(a: Self::Double, b: Self::Double) -> Self::Double;
+    /// `if a < b { a } else { b }`: b where either is NaN.
+    unsafe fn double_lesser(a: Self::Double, b: Self::Double) -> Self::Double;
+    /// `b` where a lane's bit is set, else `a`.
+    unsafe fn double_select(bits: u32, a: Self::Double, b: Self::Double) -> Self::Double;
+    /// A bit a lane: `a < b`.
+    unsafe fn double_less(a: Self::Double, b: Self::Double) -> u32;
 }

@@ -1,7 +1,7 @@
 //! Eight lanes as an array: what every processor can do, and what the other sets are compared with.
 
 use super::single::Query;
-use super::{Lanes, leaf};
+use super::{Lanes, Rows, leaf};
 use crate::accel::wide::node::Child;
 use crate::geometry::PreparedRay;
 
@@ -9,13 +9,13 @@ use crate::geometry::PreparedRay;
 pub struct Portable;
 
 #[inline(always)]
-fn zip(a: [f32; 8], b: [f32; 8], f: impl Fn(f32, f32) -> f32) -> [f32; 8] {
+fn zip<T: Copy, const N: usize>(a: [T; N], b: [T; N], f: impl Fn(T, T) -> T) -> [T; N] {
     std::array::from_fn(|lane| f(a[lane], b[lane]))
 }
 
 #[inline(always)]
-fn bits(a: [f32; 8], b: [f32; 8], f: impl Fn(&f32, &f32) -> bool) -> u32 {
-    (0..8).fold(0, |bits, lane| bits | u32::from(f(&a[lane], &b[lane])) << lane)
+fn bits<T, const N: usize>(a: [T; N], b: [T; N], f: impl Fn(&T, &T) -> bool) -> u32 {
+    (0..N).fold(0, |bits, lane| bits | u32::from(f(&a[lane], &b[lane])) << lane)
 }
 
 impl Lanes for Portable {
@@ -82,5 +82,141 @@ impl Lanes for Portable {
     unsafe fn meet_leaf<Q: Query>(words: *const u32, leaf: Child, ray: &PreparedRay, query: &mut Q) -> bool {
         // SAFETY: as the caller promises.
         unsafe { leaf::meet_leaf::<Self, Q>(words, leaf, ray, query) }
+    }
+}
+
+impl Rows for Portable {
+    type Row = [f32; 16];
+    type Double = [f64; 8];
+
+    #[inline(always)]
+    unsafe fn row(x: f32) -> [f32; 16] {
+        [x; 16]
+    }
+
+    #[inline(always)]
+    unsafe fn row_gather<const N: usize>(records: *const f32, places: &[i32; 16], size: i32) -> [[f32; 16]; N] {
+        // SAFETY: the caller points to records, of which the places are.
+        std::array::from_fn(|word| places.map(|place| unsafe { *records.add((place * size) as usize + word) }))
+    }
+
+    #[inline(always)]
+    unsafe fn row_div(a: [f32; 16], b: [f32; 16]) -> [f32; 16] {
+        zip(a, b, |a, b| a / b)
+    }
+
+    #[inline(always)]
+    unsafe fn row_farther(a: [f32; 16], steps: u32) -> [f32; 16] {
+        a.map(|x| f32::from_bits(x.to_bits() + steps))
+    }
+
+    #[inline(always)]
+    unsafe fn row_ends(a: [f32; 16]) -> [f32; 2] {
+        a.iter().fold([a[0]; 2], |[least, most], &x| [least.min(x), most.max(x)])
+    }
+
+    #[inline(always)]
+    unsafe fn row_sub(a: [f32; 16], b: [f32; 16]) -> [f32; 16] {
+        zip(a, b, |a, b| a - b)
+    }
+
+    #[inline(always)]
+    unsafe fn row_mul(a: [f32; 16], b: [f32; 16]) -> [f32; 16] {
+        zip(a, b, |a, b| a * b)
+    }
+
+    #[inline(always)]
+    unsafe fn row_add(a: [f32; 16], b: [f32; 16]) -> [f32; 16] {
+        zip(a, b, |a, b| a + b)
+    }
+
+    #[inline(always)]
+    unsafe fn row_greater(a: [f32; 16], b: [f32; 16]) -> [f32; 16] {
+        zip(a, b, |a, b| if a > b { a } else { b })
+    }
+
+    #[inline(always)]
+    unsafe fn row_lesser(a: [f32; 16], b: [f32; 16]) -> [f32; 16] {
+        zip(a, b, |a, b| if a < b { a } else { b })
+    }
+
+    #[inline(always)]
+    unsafe fn row_at_most(a: [f32; 16], b: [f32; 16]) -> u32 {
+        bits(a, b, f32::le)
+    }
+
+    #[inline(always)]
+    unsafe fn row_less(a: [f32; 16], b: [f32; 16]) -> u32 {
+        bits(a, b, f32::lt)
+    }
+
+    #[inline(always)]
+    unsafe fn row_select(bits: u32, a: [f32; 16], b: [f32; 16]) -> [f32; 16] {
+        std::array::from_fn(|lane| if bits >> lane & 1 != 0 { b[lane] } else { a[lane] })
+    }
+
+    #[inline(always)]
+    unsafe fn half(row: [f32; 16], last: bool) -> [f32; 8] {
+        std::array::from_fn(|lane| row[lane + if last { 8 } else { 0 }])
+    }
+
+    #[inline(always)]
+    unsafe fn join(first: [f32; 8], last: [f32; 8]) -> [f32; 16] {
+        std::array::from_fn(|lane| if lane < 8 { first[lane] } else { last[lane - 8] })
+    }
+
+    #[inline(always)]
+    unsafe fn widen(v: [f32; 8]) -> [f64; 8] {
+        v.map(f64::from)
+    }
+
+    #[inline(always)]
+    unsafe fn narrow(v: [f64; 8]) -> [f32; 8] {
+        v.map(|x| x as f32)
+    }
+
+    #[inline(always)]
+    unsafe fn double(x: f64) -> [f64; 8] {
+        [x; 8]
+    }
+
+    #[inline(always)]
+    unsafe fn double_sub(a: [f64; 8], b: [f64; 8]) -> [f64; 8] {
+        zip(a, b, |a, b| a - b)
+    }
+
+    #[inline(always)]
+    unsafe fn double_mul(a: [f64; 8], b: [f64; 8]) -> [f64; 8] {
+        zip(a, b, |a, b| a * b)
+    }
+
+    #[inline(always)]
+    unsafe fn double_add(a: [f64; 8], b: [f64; 8]) -> [f64; 8] {
+        zip(a, b, |a, b| a + b)
+    }
+
+    #[inline(always)]
+    unsafe fn double_div(a: [f64; 8], b: [f64; 8]) -> [f64; 8] {
+        zip(a, b, |a, b| a / b)
+    }
+
+    #[inline(always)]
+    unsafe fn double_greater(a: [f64; 8], b: [f64; 8]) -> [f64; 8] {
+        zip(a, b, |a, b| if a > b { a } else { b })
+    }
+
+    #[inline(always)]
+    unsafe fn double_lesser(a: [f64; 8], b: [f64; 8]) -> [f64; 8] {
+        zip(a, b, |a, b| if a < b { a } else { b })
+    }
+
+    #[inline(always)]
+    unsafe fn double_select(bits: u32, a: [f64; 8], b: [f64; 8]) -> [f64; 8] {
+        std::array::from_fn(|lane| if bits >> lane & 1 != 0 { b[lane] } else { a[lane] })
+    }
+
+    #[inline(always)]
+    unsafe fn double_less(a: [f64; 8], b: [f64; 8]) -> u32 {
+        bits(a, b, f64::lt)
     }
 }

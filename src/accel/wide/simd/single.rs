@@ -3,7 +3,7 @@
 use std::mem::MaybeUninit;
 
 use super::super::collapse::MOST_DEPTH;
-use super::super::node::{Child, Node, WIDTH};
+use super::super::node::{Child, NODE_SHIFT, Node, PLANE_BYTES, WIDTH};
 use super::{Lanes, Level, Portable, Set};
 use crate::accel::wide::Tree;
 use crate::geometry::{Hit, Key, PreparedRay, Ray, TriangleHit};
@@ -139,6 +139,8 @@ pub fn search_alone<Q: Query>(level: Level, tree: &Tree, ray: &Ray, query: &mut 
     }
 }
 
+/// # Safety
+/// As for [`walk`].
 #[inline(always)]
 unsafe fn prepare_and_walk<L: Lanes, Q: Query>(tree: &Tree, ray: &Ray, query: &mut Q) {
     if let Some(ray) = PreparedRay::new(ray) {
@@ -187,28 +189,32 @@ fn entry_child(entry: Entry) -> Child {
     Child(entry as u32)
 }
 
-/// A node's bytes, as a power of two.
-const NODE_SHIFT: u32 = size_of::<Node>().trailing_zeros();
-
-/// A plane of all children.
-const PLANE_BYTES: usize = WIDTH * size_of::<f32>();
-
 /// Each node on the way down leaves at most all children but one behind.
 const STACK: usize = (MOST_DEPTH + 1) * (WIDTH - 1) + 1;
 
 /// # Safety
 /// The processor has the instructions of `L`, and the children of `tree` are in range, at most [`MOST_DEPTH`] deep.
 #[inline(always)]
-unsafe fn walk<L: Lanes, Q: Query>(tree: &Tree, ray: &PreparedRay, query: &mut Q) {
+pub unsafe fn walk<L: Lanes, Q: Query>(tree: &Tree, ray: &PreparedRay, query: &mut Q) {
     // SAFETY: as the caller promises.
     unsafe {
         // Without an infinite inverse no product can be NaN: 0 times infinity does not occur.
         if ray.inverse.is_finite() {
-            walk_nodes::<L, Q, false>(tree, ray, query);
+            walk_nodes::<L, Q, false>(tree, tree.root, ray, query);
         } else {
-            walk_nodes::<L, Q, true>(tree, ray, query);
+            walk_nodes::<L, Q, true>(tree, tree.root, ray, query);
         }
     }
+}
+
+/// The same from a child on, for a ray that is parallel to no axis.
+///
+/// # Safety
+/// As for [`walk`]; the child is one of the tree's.
+#[inline(always)]
+pub unsafe fn walk_from<L: Lanes, Q: Query>(tree: &Tree, child: Child, ray: &PreparedRay, query: &mut Q) {
+    // SAFETY: as the caller promises.
+    unsafe { walk_nodes::<L, Q, false>(tree, child, ray, query) }
 }
 
 /// The search; `PARALLEL` tells that the ray may run along an axis.
@@ -216,7 +222,12 @@ unsafe fn walk<L: Lanes, Q: Query>(tree: &Tree, ray: &PreparedRay, query: &mut Q
 /// # Safety
 /// As for [`walk`].
 #[inline(always)]
-unsafe fn walk_nodes<L: Lanes, Q: Query, const PARALLEL: bool>(tree: &Tree, ray: &PreparedRay, query: &mut Q) {
+unsafe fn walk_nodes<L: Lanes, Q: Query, const PARALLEL: bool>(
+    tree: &Tree,
+    start: Child,
+    ray: &PreparedRay,
+    query: &mut Q,
+) {
     unsafe {
         let nodes: *const Node = tree.nodes.as_ptr();
         let words: *const u32 = tree.leaves.words().as_ptr();
@@ -237,7 +248,7 @@ unsafe fn walk_nodes<L: Lanes, Q: Query, const PARALLEL: bool>(tree: &Tree, ray:
 
         let mut stack = [const { MaybeUninit::<Entry>::uninit() }; STACK];
         let mut height = 0;
-        let mut current = tree.root;
+        let mut current = start;
         if current == Child::NONE {
             return;
         }
