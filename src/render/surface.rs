@@ -43,8 +43,6 @@ struct LocalPoint {
     position: DVec3,
     /// Normal of the true surface, outward, of any length.
     face: DVec3,
-    /// Interpolated normal, if there is one, of any length.
-    smooth: Option<DVec3>,
     /// How far along the normal an intersection may be off.
     error: f64,
     /// Whether the ray came from outside, where that is known better than by the normal.
@@ -63,27 +61,24 @@ impl SurfacePoint {
         match instance.shape {
             Shape::Mesh(mesh) => {
                 let mesh = &scene.meshes[mesh as usize];
-                let flat = scene.materials[material as usize].flat;
                 let corners = mesh.triangle(hit.primitive).map(|p| p.as_dvec3());
                 let weights = refined_weights(instance, ray, hit, corners);
-                let [wa, wb, wc] = weights;
+                let [_, wb, wc] = weights;
                 let [a, b, c] = corners;
                 // From one corner, so that a triangle in a plane along two axes has its points exactly there.
                 let position = a + (b - a) * wb + (c - a) * wc;
                 let face = cross(b - a, c - a);
-                let smooth = if flat || !compiled::NORMALS {
-                    None
-                } else {
-                    mesh.normals.as_ref().and_then(|normals| {
-                        let [na, nb, nc] = mesh.indices[hit.primitive as usize].map(|i| normals[i as usize]);
-                        let given = na != Vec3::ZERO && nb != Vec3::ZERO && nc != Vec3::ZERO;
-                        given.then(|| na.as_dvec3() * wa + nb.as_dvec3() * wb + nc.as_dvec3() * wc)
-                    })
-                };
                 let error = test_error(position, weights, corners, face);
-                let local =
-                    LocalPoint { position, face, smooth, error, from_outside: None, place: Place::Weights(weights) };
-                Self::placed(instance, ray, local, material)
+                let local = LocalPoint { position, face, error, from_outside: None, place: Place::Weights(weights) };
+                let mut point = Self::placed(instance, ray, local, material);
+                if compiled::NORMALS
+                    && let Some(normals) = &mesh.normals
+                    && !scene.materials[material as usize].flat
+                {
+                    let corners = mesh.indices[hit.primitive as usize].map(|i| normals[i as usize]);
+                    point.set_shading_normal(instance, corners, weights);
+                }
+                point
             }
             Shape::Quadric(_) if !compiled::QUADRICS => unreachable!("this build has no quadrics"),
             Shape::Quadric(quadric) => {
@@ -100,7 +95,6 @@ impl SurfacePoint {
         let local = LocalPoint {
             position: point.position,
             face: point.normal,
-            smooth: None,
             error: point.error,
             from_outside: point.from_outside,
             place: Place::Point(point.position),
@@ -111,25 +105,36 @@ impl SurfacePoint {
     /// Brings a point with its normals and error into the world.
     #[inline(always)]
     fn placed(instance: &Instance, ray: &ViewRay, local: LocalPoint, material: u32) -> Self {
-        let LocalPoint { position, face, smooth, error, from_outside, place } = local;
+        let LocalPoint { position, face, error, from_outside, place } = local;
         let against = -ray.direction;
         let local_normal = normalize(face).unwrap_or(DVec3::ZERO);
-        let (world, normal, smooth, error, stretch) = if instance.is_unmoved() {
-            (position, local_normal, smooth, error, 1.0)
+        let (position, normal, error, stretch) = if instance.is_unmoved() {
+            (position, local_normal, error, 1.0)
         } else {
             let transform = &instance.transform;
             let normal = transform.normal_to_world(local_normal);
-            let smooth = smooth.map(|n| transform.normal_to_world(n));
             let error = error + dot(local_normal.abs(), there_and_back(transform, position));
             // Planes a distance 1 apart in object space are 1 / |M^-T n| apart in the world.
-            (transform.point_to_world(position), normal, smooth, error, 1.0 / length(normal))
+            (transform.point_to_world(position), normal, error, 1.0 / length(normal))
         };
         let outward = normalize(normal).unwrap_or(against);
         let from_outside = from_outside.unwrap_or_else(|| dot(outward, against) >= 0.0);
         let geometric_normal = if from_outside { outward } else { -outward };
-        let normal = smooth.and_then(normalize).unwrap_or(geometric_normal);
-        let normal = if dot(normal, geometric_normal) < 0.0 { -normal } else { normal };
-        Self { position: world, geometric_normal, normal, from_outside, material, offset: error * stretch, place }
+        let (normal, offset) = (geometric_normal, error * stretch);
+        Self { position, geometric_normal, normal, from_outside, material, offset, place }
+    }
+
+    /// Interpolates the corners' normals, of any length, where all are given. Out of line, since meshes without normals need not pay.
+    #[inline(never)]
+    fn set_shading_normal(&mut self, instance: &Instance, [a, b, c]: [Vec3; 3], [wa, wb, wc]: [f64; 3]) {
+        if a == Vec3::ZERO || b == Vec3::ZERO || c == Vec3::ZERO {
+            return;
+        }
+        let local = a.as_dvec3() * wa + b.as_dvec3() * wb + c.as_dvec3() * wc;
+        let world = if instance.is_unmoved() { local } else { instance.transform.normal_to_world(local) };
+        if let Some(normal) = normalize(world) {
+            self.normal = if dot(normal, self.geometric_normal) < 0.0 { -normal } else { normal };
+        }
     }
 
     /// Texture coordinates of this point, which `hit` found; the origin if its mesh has none.

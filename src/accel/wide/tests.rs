@@ -117,7 +117,11 @@ fn packets_give_the_hits_of_the_reference() {
         for clips in [&[][..], &clips] {
             let mut expected = vec![Hit::MISS; asked.len()];
             linear.closest_batch(&asked, clips, 3, &mut expected);
-            assert!(expected.iter().filter(|hit| hit.is_hit()).count() > count.min(300), "{} hits of {count} triangles", expected.iter().filter(|hit| hit.is_hit()).count());
+            assert!(
+                expected.iter().filter(|hit| hit.is_hit()).count() > count.min(300),
+                "{} hits of {count} triangles",
+                expected.iter().filter(|hit| hit.is_hit()).count()
+            );
             for level in Level::available() {
                 let wide = Wide::build(&mesh, &params, &Silent).unwrap().with_level(level);
                 // Whole packets, and what is left over.
