@@ -2,6 +2,7 @@
 
 mod accelerators;
 mod architecture;
+mod batches;
 mod bench;
 mod command_line;
 mod common;

@@ -52,6 +52,20 @@ pub trait Answers: Sync {
     /// Whether anything is hit that is known to be opaque as a whole.
     fn is_blocked_by_opaque(&self, ray: &Self::Ray) -> bool;
 
+    /// [`first_hit`](Self::first_hit) of each ray; the slices have equal lengths.
+    fn first_hits(&self, rays: &[Self::Ray], hits: &mut [Hit]) {
+        for (ray, hit) in rays.iter().zip(hits) {
+            *hit = self.first_hit(ray);
+        }
+    }
+
+    /// [`is_blocked_by_opaque`](Self::is_blocked_by_opaque) for each ray; the slices have equal lengths.
+    fn are_blocked_by_opaque(&self, rays: &[Self::Ray], blocked: &mut [bool]) {
+        for (ray, blocked) in rays.iter().zip(blocked) {
+            *blocked = self.is_blocked_by_opaque(ray);
+        }
+    }
+
     /// Visits the hits on what is not opaque as a whole, in order, until `visit` returns false.
     fn visit_transmissive(&self, ray: &Self::Ray, visit: impl FnMut(&Hit) -> bool);
 }
@@ -104,6 +118,14 @@ impl<I: Intersect> Answers for I {
     #[inline(always)]
     fn is_blocked_by_opaque(&self, ray: &Ray) -> bool {
         self.occluded_by_opaque(ray)
+    }
+
+    fn first_hits(&self, rays: &[Ray], hits: &mut [Hit]) {
+        self.closest_batch(rays, hits);
+    }
+
+    fn are_blocked_by_opaque(&self, rays: &[Ray], blocked: &mut [bool]) {
+        self.occluded_by_opaque_batch(rays, blocked);
     }
 
     #[inline(always)]

@@ -49,18 +49,29 @@ pub trait Intersect: Sync {
             *occluded = self.occluded(ray);
         }
     }
+
+    /// [`occluded_by_opaque`](Self::occluded_by_opaque) for each ray.
+    ///
+    /// # Panics
+    /// If the slices have different lengths.
+    fn occluded_by_opaque_batch(&self, rays: &[Ray], occluded: &mut [bool]) {
+        assert_eq!(rays.len(), occluded.len(), "one answer a ray");
+        for (ray, occluded) in rays.iter().zip(occluded) {
+            *occluded = self.occluded_by_opaque(ray);
+        }
+    }
 }
 
 /// A scene's instances over one kind of triangle accelerator.
 pub struct TwoLevel<A> {
-    meshes: Vec<A>,
+    pub(super) meshes: Vec<A>,
     quadrics: Vec<Quadric>,
-    world: World,
-    top: Top,
+    pub(super) world: World,
+    pub(super) top: Top,
 }
 
 /// How instances are found.
-enum Top {
+pub(super) enum Top {
     /// The scene is one untransformed mesh.
     Single,
     /// A tree over the bounded instances, and the numbers of the others.
@@ -75,11 +86,11 @@ fn boxes(instances: &[Instance]) -> Vec<Bounds> {
 }
 
 /// Which instances a search considers.
-trait Filter {
+pub(super) trait Filter {
     fn wants(instance: &Instance) -> bool;
 }
 
-struct Everything;
+pub(super) struct Everything;
 struct Opaque;
 struct Transmissive;
 
@@ -161,7 +172,7 @@ impl<A: TriangleAccelerator> TwoLevel<A> {
     }
 
     /// The first hit strictly after `after` on wanted instances.
-    fn search<F: Filter>(&self, ray: &PreparedRay, after: Option<Key>) -> Hit {
+    pub(super) fn search<F: Filter>(&self, ray: &PreparedRay, after: Option<Key>) -> Hit {
         let mut best = Hit::MISS;
         match &self.top {
             Top::Single if F::wants(&self.world.instances[0]) => self.meet_mesh(0, 0, ray, after, &mut best),
@@ -188,7 +199,7 @@ impl<A: TriangleAccelerator> TwoLevel<A> {
 
     /// Improves `best` by what one instance has to offer.
     #[inline]
-    fn meet<F: Filter>(&self, number: u32, ray: &PreparedRay, after: Option<Key>, best: &mut Hit) {
+    pub(super) fn meet<F: Filter>(&self, number: u32, ray: &PreparedRay, after: Option<Key>, best: &mut Hit) {
         let instance = &self.world.instances[number as usize];
         if !F::wants(instance) {
             return;
@@ -262,7 +273,7 @@ impl<A: TriangleAccelerator> TwoLevel<A> {
     }
 
     /// Whether any wanted instance is hit.
-    fn any<F: Filter>(&self, ray: &PreparedRay) -> bool {
+    pub(super) fn any<F: Filter>(&self, ray: &PreparedRay) -> bool {
         match &self.top {
             Top::Single => F::wants(&self.world.instances[0]) && self.meshes[0].occluded(ray),
             Top::Linear => (0..self.world.instances.len() as u32).any(|number| self.blocks::<F>(number, ray)),
@@ -282,7 +293,7 @@ impl<A: TriangleAccelerator> TwoLevel<A> {
 
     /// Whether one instance is hit.
     #[inline]
-    fn blocks<F: Filter>(&self, number: u32, ray: &PreparedRay) -> bool {
+    pub(super) fn blocks<F: Filter>(&self, number: u32, ray: &PreparedRay) -> bool {
         let instance = &self.world.instances[number as usize];
         if !F::wants(instance) {
             return false;
@@ -321,24 +332,17 @@ impl<A: TriangleAccelerator> Intersect for TwoLevel<A> {
 
     fn closest_batch(&self, rays: &[Ray], hits: &mut [Hit]) {
         assert_eq!(rays.len(), hits.len(), "one hit a ray");
-        if let Top::Single = self.top {
-            hits.fill(Hit::MISS);
-            return self.meshes[0].closest_batch(rays, &[], 0, hits);
-        }
-        for (ray, hit) in rays.iter().zip(hits) {
-            *hit = self.closest(ray);
-        }
+        self.closest_all(rays, hits);
     }
 
     fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool]) {
         assert_eq!(rays.len(), occluded.len(), "one answer a ray");
-        if let Top::Single = self.top {
-            occluded.fill(false);
-            return self.meshes[0].occluded_batch(rays, &[], occluded);
-        }
-        for (ray, occluded) in rays.iter().zip(occluded) {
-            *occluded = self.occluded(ray);
-        }
+        self.occluded_all::<Everything>(rays, occluded);
+    }
+
+    fn occluded_by_opaque_batch(&self, rays: &[Ray], occluded: &mut [bool]) {
+        assert_eq!(rays.len(), occluded.len(), "one answer a ray");
+        self.occluded_all::<Opaque>(rays, occluded);
     }
 
     fn occluded_by_opaque(&self, ray: &Ray) -> bool {

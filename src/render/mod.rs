@@ -5,6 +5,8 @@
 //!                  ^  \-> shade -> shadow -> intersect
 //!                  \--------/
 //! ```
+//!
+//! Pictures take the same steps for many rays at once (`wave`), and give the same bytes.
 
 pub mod answers;
 pub mod film;
@@ -18,6 +20,8 @@ pub mod shadow;
 mod silhouette;
 pub mod surface;
 pub mod trace;
+mod two_level_batch;
+mod wave;
 pub mod world;
 
 pub use answers::Answers;

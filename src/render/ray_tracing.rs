@@ -12,6 +12,7 @@ use crate::render::sampling;
 use crate::render::settings::{Crop, RayCounts, RenderSettings, RenderStats};
 use crate::render::surface::SurfacePoint;
 use crate::render::trace::Tracer;
+use crate::render::wave::LARGEST;
 use crate::render::world::World;
 use crate::scene::camera::{CameraRays, ViewRay};
 use crate::scene::{Background, Scene};
@@ -136,50 +137,120 @@ fn tile_pixels<I: Answers>(
     let channels = aovs.iter().map(|kind| kind.channels().len()).sum();
     let mut tile = Tile {
         area,
-        color: Vec::with_capacity(pixels),
-        alpha: Vec::with_capacity(pixels),
-        aovs: vec![Vec::with_capacity(pixels); channels],
+        color: Vec::new(),
+        alpha: Vec::new(),
+        aovs: vec![vec![0.0; pixels]; channels],
         counts: RayCounts::default(),
     };
     let samples = tracer.scene.film.samples;
-    for y in area.y0..area.y1 {
+    let transparent = tracer.scene.background == Background::Transparent;
+    tile.color.resize(pixels, [0.0; 3]);
+    if transparent {
+        tile.alpha.resize(pixels, 0.0);
+    }
+    let width = area.x1 - area.x0;
+    let order = block_order(area);
+    // As many pixels as there are samples for a batch, or some of a pixel's samples.
+    let together = (LARGEST / samples as usize).max(1);
+    for some in order.chunks(together) {
         if progress.is_cancelled() {
             return None;
         }
-        for x in area.x0..area.x1 {
-            // The mean of the samples, summed in f64 in their order.
-            let mut sum = [0.0f64; 3];
-            let mut covered = 0u32;
-            for sample in 0..samples {
-                let within = sampling::position(x, y, sample, samples);
-                let view = camera.ray(DVec2::new(f64::from(x), f64::from(y)) + within);
-                let (color, hit) = match view {
-                    Some(view) => tracer.trace_camera(view),
-                    None => (crate::scene::Rgb::ZERO, Hit::MISS),
-                };
-                for (sum, value) in sum.iter_mut().zip(color.to_array()) {
-                    *sum += f64::from(value);
-                }
-                covered += u32::from(hit.is_hit());
-                if sample == 0 && !aovs.is_empty() {
-                    record(tracer, view.as_ref(), &hit, aovs, &mut tile.aovs);
-                }
+        pixels_together(tracer, camera, some, |x, y, pixel| {
+            let at = ((y - area.y0) * width + (x - area.x0)) as usize;
+            tile.color[at] = pixel.color;
+            if transparent {
+                tile.alpha[at] = pixel.alpha;
             }
-            tile.color.push(sum.map(|sum| (sum / f64::from(samples)) as f32));
-            tile.alpha.push((f64::from(covered) / f64::from(samples)) as f32);
-        }
+            if !aovs.is_empty() {
+                record(tracer, pixel.view.as_ref(), &pixel.hit, aovs, &mut tile.aovs, at);
+            }
+        });
     }
     tile.counts = tracer.counts();
     Some(tile)
 }
 
-/// Appends one pixel's extra values, channel by channel.
+/// A tile's pixels in blocks of 4 x 4, so that rays that follow each other go alike.
+fn block_order(area: Crop) -> Vec<(u32, u32)> {
+    const SIDE: u32 = 4;
+    let mut order = Vec::with_capacity(((area.x1 - area.x0) * (area.y1 - area.y0)) as usize);
+    for y0 in (area.y0..area.y1).step_by(SIDE as usize) {
+        for x0 in (area.x0..area.x1).step_by(SIDE as usize) {
+            for y in y0..(y0 + SIDE).min(area.y1) {
+                order.extend((x0..(x0 + SIDE).min(area.x1)).map(|x| (x, y)));
+            }
+        }
+    }
+    order
+}
+
+/// What is known of a pixel.
+struct Pixel {
+    /// The mean of its samples.
+    color: [f32; 3],
+    /// The part of them that hit something.
+    alpha: f32,
+    /// The first sample's ray.
+    view: Option<ViewRay>,
+    /// What that hit.
+    hit: Hit,
+}
+
+/// Renders some pixels and hands them over in order.
+fn pixels_together<I: Answers>(
+    tracer: &Tracer<'_, I>,
+    camera: &CameraRays,
+    pixels: &[(u32, u32)],
+    mut finished: impl FnMut(u32, u32, Pixel),
+) {
+    let samples = tracer.scene.film.samples;
+    let mut rays = pixels.iter().flat_map(|&(x, y)| {
+        (0..samples).map(move |sample| {
+            let within = sampling::position(x, y, sample, samples);
+            camera.ray(DVec2::new(f64::from(x), f64::from(y)) + within)
+        })
+    });
+    let mut pixels = pixels.iter();
+    // The pixel at hand: the sums of its samples, in f64 in their order.
+    let (mut sum, mut covered, mut sample) = ([0.0f64; 3], 0u32, 0u32);
+    let mut first = (None, Hit::MISS);
+    loop {
+        let views: Vec<Option<ViewRay>> = rays.by_ref().take(LARGEST).collect();
+        if views.is_empty() {
+            return;
+        }
+        let (colors, hits) = tracer.trace_cameras(views.iter().flatten().copied().collect());
+        let mut seen = colors.into_iter().zip(hits);
+        for view in views {
+            let (color, hit) = view.and_then(|_| seen.next()).unwrap_or((crate::scene::Rgb::ZERO, Hit::MISS));
+            for (sum, value) in sum.iter_mut().zip(color.to_array()) {
+                *sum += f64::from(value);
+            }
+            covered += u32::from(hit.is_hit());
+            if sample == 0 {
+                first = (view, hit);
+            }
+            sample += 1;
+            if sample == samples {
+                let &(x, y) = pixels.next().expect("each pixel has as many samples");
+                let color = sum.map(|sum| (sum / f64::from(samples)) as f32);
+                let alpha = (f64::from(covered) / f64::from(samples)) as f32;
+                finished(x, y, Pixel { color, alpha, view: first.0, hit: first.1 });
+                (sum, covered, sample) = ([0.0; 3], 0, 0);
+            }
+        }
+    }
+}
+
+/// Sets one pixel's extra values, channel by channel.
 fn record<I: Answers>(
     tracer: &Tracer<'_, I>,
     view: Option<&ViewRay>,
     hit: &Hit,
     aovs: &[AovKind],
     channels: &mut [Vec<f32>],
+    at: usize,
 ) {
     let found = view.filter(|_| hit.is_hit()).map(|view| SurfacePoint::of(tracer.scene, tracer.world, view, hit));
     let mut channels = channels.iter_mut();
@@ -198,7 +269,7 @@ fn record<I: Answers>(
             (Some(point), AovKind::Albedo) => tracer.colors(point, hit).diffuse.to_array(),
         };
         for (value, channel) in values.into_iter().zip(channels.by_ref().take(kind.channels().len())) {
-            channel.push(value);
+            channel[at] = value;
         }
     }
 }

@@ -189,6 +189,18 @@ impl Intersect for Renderer {
         Self::next_after(self, ray, key)
     }
 
+    fn closest_batch(&self, rays: &[Ray], hits: &mut [Hit]) {
+        Self::closest_batch(self, rays, hits);
+    }
+
+    fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool]) {
+        Self::occluded_batch(self, rays, occluded);
+    }
+
+    fn occluded_by_opaque_batch(&self, rays: &[Ray], occluded: &mut [bool]) {
+        with_structure!(&self.intersect, structure => structure.occluded_by_opaque_batch(rays, occluded));
+    }
+
     fn next_transmissive_after(&self, ray: &Ray, key: Key) -> Hit {
         with_structure!(&self.intersect, structure => structure.next_transmissive_after(ray, key))
     }

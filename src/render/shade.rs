@@ -6,7 +6,7 @@ use glam::DVec3;
 use crate::geometry::Hit;
 use crate::math::vector::{dot, normalize};
 use crate::render::answers::{Answers, Meeting};
-use crate::render::shadow::Illumination;
+use crate::render::shadow::{Illumination, PreparedLight};
 use crate::render::surface::SurfacePoint;
 use crate::render::trace::{TracedRay, Tracer};
 use crate::scene::camera::ViewRay;
@@ -45,30 +45,55 @@ impl<I: Answers> Tracer<'_, I> {
 
         // Ambient, then each light: diffuse and highlight.
         let mut color = colors.ambient;
-        let lights = &self.world.lights;
-        for light in if compiled::MANY_LIGHTS { lights } else { &lights[..1] } {
+        for light in self.lights() {
             let Some(illumination) = Illumination::at(light, point) else { continue };
             let visible = self.visibility(&here, &illumination);
             if visible != Rgb::ZERO {
-                color += visible * illumination.color * direct(material, colors.diffuse, point, view, &illumination);
+                color += self.lit(visible, &illumination, &colors, point, view);
             }
         }
 
         // Mirror and transmission.
         if depth < self.scene.film.max_depth {
             if compiled::REFLECTION && material.is_reflective() {
-                self.count(|counts| counts.reflected += 1);
-                color += material.kr * self.trace(&self.reflected_ray(&here), depth + 1);
+                color += material.kr * self.trace(&self.reflected(&here), depth + 1);
             }
             if compiled::REFRACTION && material.is_transmissive() {
-                color += material.kt * self.trace(&self.transmitted_ray(&here, material), depth + 1);
+                color += material.kt * self.trace(&self.transmitted(&here, material), depth + 1);
             }
         }
 
+        self.clamp(color)
+    }
+
+    /// What is done to a colour after each Shade.
+    #[inline(always)]
+    pub(super) fn clamp(&self, color: Rgb) -> Rgb {
         match self.scene.film.clamp {
             Clamp::Shade => color.min(Rgb::ONE),
             Clamp::Output => color,
         }
+    }
+
+    /// The lights, in the scene's order.
+    #[inline(always)]
+    pub(super) fn lights(&self) -> &[PreparedLight] {
+        let lights = &self.world.lights;
+        if compiled::MANY_LIGHTS { lights } else { &lights[..1] }
+    }
+
+    /// What a light adds that is visible from a point.
+    #[inline(always)]
+    pub(super) fn lit(
+        &self,
+        visible: Rgb,
+        illumination: &Illumination,
+        colors: &SurfaceColors,
+        point: &SurfacePoint,
+        view: &ViewRay,
+    ) -> Rgb {
+        let material = &self.scene.materials[point.material as usize];
+        visible * illumination.color * direct(material, colors.diffuse, point, view, illumination)
     }
 
     /// The colours of the point that `hit` found.
@@ -86,24 +111,23 @@ impl<I: Answers> Tracer<'_, I> {
         SurfaceColors { ambient: ambient + material.emission, diffuse }
     }
 
-    /// The mirror ray of a point.
-    fn reflected_ray(&self, from: &Meeting<'_>) -> TracedRay<I::Ray> {
+    /// The mirror ray of a point, counted.
+    pub(super) fn reflected(&self, from: &Meeting<'_>) -> TracedRay<I::Ray> {
+        self.count(|counts| counts.reflected += 1);
         let direction = reflect(from.point, from.view.direction);
         let view = ViewRay { origin: from.point.position, direction };
         TracedRay { ray: self.intersect.ray_outside(from, direction), view }
     }
 
-    fn transmitted_ray(&self, from: &Meeting<'_>, material: &Material) -> TracedRay<I::Ray> {
+    /// The ray that goes on through a surface, or is reflected within, counted.
+    pub(super) fn transmitted(&self, from: &Meeting<'_>, material: &Material) -> TracedRay<I::Ray> {
         match refract(from.point, f64::from(material.ior), from.view.direction) {
             Refraction::Through(direction) => {
                 self.count(|counts| counts.refracted += 1);
                 let view = ViewRay { origin: from.point.position, direction };
                 TracedRay { ray: self.intersect.ray_inside(from, direction), view }
             }
-            Refraction::Total => {
-                self.count(|counts| counts.reflected += 1);
-                self.reflected_ray(from)
-            }
+            Refraction::Total => self.reflected(from),
         }
     }
 }

@@ -130,11 +130,16 @@ impl<I: Answers> Tracer<'_, I> {
         if self.intersect.is_blocked_by_opaque(&ray) {
             return Rgb::ZERO;
         }
+        self.visible_through(&ray)
+    }
+
+    /// The same for a shadow ray that nothing opaque blocks.
+    pub(super) fn visible_through(&self, ray: &I::Ray) -> Rgb {
         let mut visible = Rgb::ONE;
         if self.world.all_opaque || !compiled::REFRACTION {
             return visible;
         }
-        self.intersect.visit_transmissive(&ray, |hit| {
+        self.intersect.visit_transmissive(ray, |hit| {
             visible *= self.scene.materials[self.scene.material_of(hit.instance, hit.primitive) as usize].kt;
             visible != Rgb::ZERO
         });

@@ -65,10 +65,16 @@ impl<'a, I: Answers> Tracer<'a, I> {
         if !hit.is_hit() {
             return (background(&self.scene.background, ray.view.direction), hit);
         }
+        let (hit, point) = self.meet(ray, hit);
+        (self.shade_point(&ray.view, &hit, &point, depth), hit)
+    }
+
+    /// The surface that a ray comes upon where `hit` was found first, and where.
+    #[inline(always)]
+    pub(super) fn meet(&self, ray: &TracedRay<I::Ray>, hit: Hit) -> (Hit, SurfacePoint) {
         let point = SurfacePoint::of(self.scene, self.world, &ray.view, &hit);
         let entry = if point.from_outside { None } else { self.entry_before(ray, &hit, &point) };
-        let (hit, point) = entry.unwrap_or((hit, point));
-        (self.shade_point(&ray.view, &hit, &point, depth), hit)
+        entry.unwrap_or((hit, point))
     }
 
     /// The rays traced so far.
