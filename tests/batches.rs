@@ -12,7 +12,8 @@ use whitted::scene::film::Clamp;
 
 #[test]
 fn batches_see_what_the_recursion_sees() {
-    let scenes = ["cornell_box", "glass_over_checker", "mirrors", "quadrics", "seed_camera", "teapot", "textured_crate"];
+    let scenes =
+        ["cornell_box", "glass_over_checker", "mirrors", "quadrics", "seed_camera", "teapot", "textured_crate"];
     for name in scenes {
         for clamp in [Clamp::Shade, Clamp::Output] {
             let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{name}.toml"));

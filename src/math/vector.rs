@@ -30,10 +30,26 @@ pub fn length(a: DVec3) -> f64 {
 }
 
 /// The unit vector along `a`, or `None` for zero, infinite and NaN vectors.
-///
-/// The vector is first scaled by its largest component, so that no square under- or overflows.
-#[inline]
+#[inline(always)]
 pub fn normalize(a: DVec3) -> Option<DVec3> {
+    normal_and_length(a).map(|(unit, _)| unit)
+}
+
+/// The unit vector along `a` and its [`length`], which may have over- or underflowed; or `None` for zero, infinite and NaN vectors.
+#[inline(always)]
+pub fn normal_and_length(a: DVec3) -> Option<(DVec3, f64)> {
+    const SAFE: std::ops::Range<f64> = 1e-200..1e200;
+    let squared = dot(a, a);
+    let length = squared.sqrt();
+    if SAFE.contains(&squared) {
+        return Some((a / length, length));
+    }
+    normalize_scaled(a).map(|unit| (unit, length))
+}
+
+/// The vector is first scaled by its largest component, so that no square under- or overflows.
+#[cold]
+fn normalize_scaled(a: DVec3) -> Option<DVec3> {
     let largest = a.x.abs().max(a.y.abs()).max(a.z.abs());
     if !(largest > 0.0 && largest < f64::INFINITY) {
         return None;

@@ -8,7 +8,7 @@ use crate::geometry::Hit;
 use crate::progress::Progress;
 use crate::render::answers::Answers;
 use crate::render::film::{Aov, AovKind, Film};
-use crate::render::sampling;
+use crate::render::sampling::Pattern;
 use crate::render::settings::{Crop, RayCounts, RenderSettings, RenderStats};
 use crate::render::surface::SurfacePoint;
 use crate::render::trace::Tracer;
@@ -206,10 +206,8 @@ fn pixels_together<I: Answers>(
 ) {
     let samples = tracer.scene.film.samples;
     let mut rays = pixels.iter().flat_map(|&(x, y)| {
-        (0..samples).map(move |sample| {
-            let within = sampling::position(x, y, sample, samples);
-            camera.ray(DVec2::new(f64::from(x), f64::from(y)) + within)
-        })
+        let (corner, pattern) = (DVec2::new(f64::from(x), f64::from(y)), Pattern::new(x, y, samples));
+        (0..samples).map(move |sample| camera.ray(corner + pattern.position(sample)))
     });
     let mut pixels = pixels.iter();
     // The pixel at hand: the sums of its samples, in f64 in their order.

@@ -4,45 +4,92 @@ use glam::DVec2;
 
 use crate::math::random::{hash2, unit};
 
-/// The position of a sample within its pixel, both coordinates in [0, 1).
+/// The position of a sample within its pixel, both coordinates in [0, 1); [`Pattern::position`] of that pixel.
+pub fn position(x: u32, y: u32, sample: u32, samples: u32) -> DVec2 {
+    Pattern::new(x, y, samples).position(sample)
+}
+
+/// Where the samples of one pixel lie.
 ///
 /// One sample lies at the centre. More are correlated multi-jittered (Kensler, "Correlated Multi-Jittered Sampling",
 /// Pixar 2013): stratified on a grid and on both axes, for any number. The pattern is keyed by the pixel's position
 /// in the full picture, so crops and tiles do not change it.
-pub fn position(x: u32, y: u32, sample: u32, samples: u32) -> DVec2 {
-    if samples == 1 {
-        return DVec2::splat(0.5);
-    }
-    let pattern = hash2(x, y);
-    let columns = (f64::from(samples).sqrt() as u32).max(1);
-    let rows = samples.div_ceil(columns);
-    let shuffled = permute(sample, samples, pattern ^ 0x51f1_5e5b);
-    let column = permute(shuffled % columns, columns, pattern ^ 0xa511_e9b3);
-    let row = permute(shuffled / columns, rows, pattern ^ 0x63d8_3595);
-    let jitter = |salt: u32| unit(hash2(shuffled, pattern ^ salt));
-    let within = |index: f64, count: u32| (index / f64::from(count)).min(1.0f64.next_down());
-    DVec2::new(
-        within(f64::from(column) + (f64::from(row) + jitter(0xa399_d265)) / f64::from(rows), columns),
-        within(f64::from(shuffled) + jitter(0x711a_d6a5), samples),
-    )
+#[derive(Debug, Clone, Copy)]
+pub struct Pattern {
+    key: u32,
+    samples: u32,
+    columns: u32,
+    rows: u32,
+    order: Permutation,
+    column: Permutation,
+    row: Permutation,
 }
 
-/// A pseudo-random permutation of `0..length`, chosen by `key`.
+impl Pattern {
+    /// The pattern of a pixel.
+    pub fn new(x: u32, y: u32, samples: u32) -> Self {
+        let key = hash2(x, y);
+        let columns = (f64::from(samples).sqrt() as u32).max(1);
+        let rows = samples.div_ceil(columns);
+        Self {
+            key,
+            samples,
+            columns,
+            rows,
+            order: Permutation::new(samples, key ^ 0x51f1_5e5b),
+            column: Permutation::new(columns, key ^ 0xa511_e9b3),
+            row: Permutation::new(rows, key ^ 0x63d8_3595),
+        }
+    }
+
+    /// The position of a sample within the pixel, both coordinates in [0, 1).
+    pub fn position(&self, sample: u32) -> DVec2 {
+        if self.samples == 1 {
+            return DVec2::splat(0.5);
+        }
+        let shuffled = self.order.at(sample);
+        let column = self.column.at(shuffled % self.columns);
+        let row = self.row.at(shuffled / self.columns);
+        let jitter = |salt: u32| unit(hash2(shuffled, self.key ^ salt));
+        let within = |index: f64, count: u32| (index / f64::from(count)).min(1.0f64.next_down());
+        let across = f64::from(column) + (f64::from(row) + jitter(0xa399_d265)) / f64::from(self.rows);
+        DVec2::new(within(across, self.columns), within(f64::from(shuffled) + jitter(0x711a_d6a5), self.samples))
+    }
+}
+
+/// A pseudo-random permutation of `0..length`, chosen by a key.
 ///
 /// Four rounds of multiply, add and xor-shift, each a bijection on the next power of two, repeated until the value
 /// falls below `length` (cycle walking).
-fn permute(index: u32, length: u32, key: u32) -> u32 {
-    let mask = length.next_power_of_two() - 1;
-    let shift = (mask.count_ones() / 2).max(1);
-    let mut i = index;
-    loop {
-        for round in 0..4 {
+#[derive(Debug, Clone, Copy)]
+struct Permutation {
+    length: u32,
+    mask: u32,
+    shift: u32,
+    /// What each round multiplies by and adds.
+    rounds: [(u32, u32); 4],
+}
+
+impl Permutation {
+    fn new(length: u32, key: u32) -> Self {
+        let mask = length.next_power_of_two() - 1;
+        let rounds = [0, 1, 2, 3].map(|round| {
             let mix = hash2(key, round);
-            i = i.wrapping_mul(mix | 1).wrapping_add(mix >> 7) & mask;
-            i ^= i >> shift;
-        }
-        if i < length {
-            return i;
+            (mix | 1, mix >> 7)
+        });
+        Self { length, mask, shift: (mask.count_ones() / 2).max(1), rounds }
+    }
+
+    fn at(&self, index: u32) -> u32 {
+        let mut i = index;
+        loop {
+            for (factor, term) in self.rounds {
+                i = i.wrapping_mul(factor).wrapping_add(term) & self.mask;
+                i ^= i >> self.shift;
+            }
+            if i < self.length {
+                return i;
+            }
         }
     }
 }
@@ -55,7 +102,7 @@ mod tests {
     fn permutations_visit_everything_once() {
         for length in [1, 2, 3, 5, 16, 17, 100] {
             for key in [0, 1, 0xdead_beef, 0x8000_0001] {
-                let mut seen: Vec<u32> = (0..length).map(|i| permute(i, length, key)).collect();
+                let mut seen: Vec<u32> = (0..length).map(|i| Permutation::new(length, key).at(i)).collect();
                 seen.sort_unstable();
                 assert!(seen.iter().copied().eq(0..length), "{length} {key}");
             }

@@ -6,7 +6,7 @@ use crate::geometry::triangle::hit_bounds;
 use crate::geometry::{Bounds, Hit, Quadric};
 use crate::math::Transform;
 use crate::math::float::{gamma, round_down, round_up};
-use crate::math::vector::{cross, dot, length, normalize};
+use crate::math::vector::{cross, dot, normal_and_length, normalize};
 use crate::render::world::{Instance, World};
 use crate::scene::camera::ViewRay;
 use crate::scene::{Scene, Shape, compiled};
@@ -41,8 +41,8 @@ enum Place {
 /// A point in object space, before it is placed in the world.
 struct LocalPoint {
     position: DVec3,
-    /// Normal of the true surface, outward, of any length.
-    face: DVec3,
+    /// Unit normal of the true surface, outward, where there is one.
+    normal: Option<DVec3>,
     /// How far along the normal an intersection may be off.
     error: f64,
     /// Whether the ray came from outside, where that is known better than by the normal.
@@ -67,9 +67,10 @@ impl SurfacePoint {
                 let [a, b, c] = corners;
                 // From one corner, so that a triangle in a plane along two axes has its points exactly there.
                 let position = a + (b - a) * wb + (c - a) * wc;
-                let face = cross(b - a, c - a);
-                let error = test_error(position, weights, corners, face);
-                let local = LocalPoint { position, face, error, from_outside: None, place: Place::Weights(weights) };
+                let face = normal_and_length(cross(b - a, c - a));
+                let error = face.map_or(0.0, |face| test_error(position, weights, corners, face));
+                let normal = face.map(|(normal, _)| normal);
+                let local = LocalPoint { position, normal, error, from_outside: None, place: Place::Weights(weights) };
                 let mut point = Self::placed(instance, ray, local, material);
                 if compiled::NORMALS
                     && let Some(normals) = &mesh.normals
@@ -94,7 +95,7 @@ impl SurfacePoint {
         let point = quadric.point(origin, direction, hit.primitive);
         let local = LocalPoint {
             position: point.position,
-            face: point.normal,
+            normal: normalize(point.normal),
             error: point.error,
             from_outside: point.from_outside,
             place: Place::Point(point.position),
@@ -105,22 +106,20 @@ impl SurfacePoint {
     /// Brings a point with its normals and error into the world.
     #[inline(always)]
     fn placed(instance: &Instance, ray: &ViewRay, local: LocalPoint, material: u32) -> Self {
-        let LocalPoint { position, face, error, from_outside, place } = local;
+        let LocalPoint { position, normal, error, from_outside, place } = local;
         let against = -ray.direction;
-        let local_normal = normalize(face).unwrap_or(DVec3::ZERO);
-        let (position, normal, error, stretch) = if instance.is_unmoved() {
-            (position, local_normal, error, 1.0)
+        let (position, outward, offset) = if instance.is_unmoved() {
+            (position, normal.unwrap_or(against), error)
         } else {
-            let transform = &instance.transform;
-            let normal = transform.normal_to_world(local_normal);
-            let error = error + dot(local_normal.abs(), there_and_back(transform, position));
+            let (transform, local) = (&instance.transform, normal.unwrap_or(DVec3::ZERO));
+            let error = error + dot(local.abs(), there_and_back(transform, position));
+            let (outward, length) = normal_and_length(transform.normal_to_world(local)).unwrap_or((against, 1.0));
             // Planes a distance 1 apart in object space are 1 / |M^-T n| apart in the world.
-            (transform.point_to_world(position), normal, error, 1.0 / length(normal))
+            (transform.point_to_world(position), outward, error / length)
         };
-        let outward = normalize(normal).unwrap_or(against);
         let from_outside = from_outside.unwrap_or_else(|| dot(outward, against) >= 0.0);
         let geometric_normal = if from_outside { outward } else { -outward };
-        let (normal, offset) = (geometric_normal, error * stretch);
+        let normal = geometric_normal;
         Self { position, geometric_normal, normal, from_outside, material, offset, place }
     }
 
@@ -204,9 +203,8 @@ fn there_and_back(transform: &Transform, position: DVec3) -> DVec3 {
 /// triangle's box, so that a start above all of the box is enough, from where no ray that leaves the triangle meets it: on
 /// an axis-aligned triangle that is no distance at all, and contact shadows stay attached. Two roundings of the point's
 /// coordinates are for the start of a ray that is rounded in the mesh's own space.
-fn test_error(position: DVec3, weights: [f64; 3], [a, b, c]: [DVec3; 3], face: DVec3) -> f64 {
-    let Some(normal) = normalize(face) else { return 0.0 };
-    let twice_area = length(face);
+#[inline(always)]
+fn test_error(position: DVec3, weights: [f64; 3], [a, b, c]: [DVec3; 3], (normal, twice_area): (DVec3, f64)) -> f64 {
     let squared = |corner: DVec3| dot(corner - position, corner - position);
     let reach_squared = squared(a).max(squared(b)).max(squared(c));
     // How far the box reaches above and below the triangle's plane.
