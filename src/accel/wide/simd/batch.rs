@@ -31,6 +31,43 @@ fn signature(ray: &Ray) -> Signature {
     if goes { packet } else { ALONE }
 }
 
+/// Whether packets are worth their while: told by how many of their rays meet a box together, tried again from time to time.
+struct Coherence {
+    /// Packets whose rays go alone before the next one is tried.
+    alone: u32,
+    /// The last packet was not worth it.
+    failed: bool,
+}
+
+impl Coherence {
+    /// A packet whose rays meet boxes with fewer than this many together is slower than they are alone.
+    const LEAST_MET: u32 = 5;
+
+    /// Packets that go alone after two that were not worth it.
+    const PAUSE: u32 = 14;
+
+    fn new() -> Self {
+        Self { alone: 0, failed: false }
+    }
+
+    /// Whether to try a packet.
+    #[inline(always)]
+    fn tries(&mut self) -> bool {
+        self.alone = self.alone.saturating_sub(1);
+        self.alone == 0
+    }
+
+    /// Takes note of a packet.
+    #[inline(always)]
+    fn saw(&mut self, boxes: u32, met: u32) {
+        let fails = met < Self::LEAST_MET * boxes;
+        if fails && self.failed {
+            self.alone = Self::PAUSE;
+        }
+        self.failed = fails;
+    }
+}
+
 /// The first hits of rays: each replaces the one at the same place in `best` if it comes before that.
 #[inline(always)]
 pub fn closest_batch(level: Level, tree: &Tree, rays: &[Ray], clips: &[Interval], instance: u32, best: &mut [Hit]) {
@@ -88,12 +125,13 @@ compile!(super::avx::Avx512, "avx512f,avx512vl,avx512dq,bmi1,popcnt", closest_av
 /// The processor has the instructions of `L`, and the tree's children are in range.
 #[inline(always)]
 unsafe fn closest<L: Rows>(tree: &Tree, rays: &[Ray], clips: &[Interval], instance: u32, best: &mut [Hit]) {
+    let mut coherence = Coherence::new();
     for (number, (rays, best)) in rays.chunks(CHUNK).zip(best.chunks_mut(CHUNK)).enumerate() {
         let clips = if clips.is_empty() { clips } else { &clips[number * CHUNK..number * CHUNK + rays.len()] };
         let asked = Asked { rays, clips, instance };
         let sorted = Sorted::new(rays, |_| true);
         for (signature, together) in sorted.packets() {
-            if signature == ALONE || together.len() < LEAST {
+            if signature == ALONE || together.len() < LEAST || !coherence.tries() {
                 for &at in together {
                     let at = usize::from(at);
                     let mut query = Closest { instance, best: &mut best[at] };
@@ -109,6 +147,7 @@ unsafe fn closest<L: Rows>(tree: &Tree, rays: &[Ray], clips: &[Interval], instan
                 packet.finish();
                 packet
             };
+            coherence.saw(packet.boxes, packet.met);
             for (lane, &at) in together.iter().enumerate() {
                 best[usize::from(at)] = packet.best(lane);
             }
@@ -120,12 +159,13 @@ unsafe fn closest<L: Rows>(tree: &Tree, rays: &[Ray], clips: &[Interval], instan
 /// As for [`closest`].
 #[inline(always)]
 unsafe fn occluded<L: Rows>(tree: &Tree, rays: &[Ray], clips: &[Interval], found: &mut [bool]) {
+    let mut coherence = Coherence::new();
     for (number, (rays, found)) in rays.chunks(CHUNK).zip(found.chunks_mut(CHUNK)).enumerate() {
         let clips = if clips.is_empty() { clips } else { &clips[number * CHUNK..number * CHUNK + rays.len()] };
         let asked = Asked { rays, clips, instance: 0 };
         let sorted = Sorted::new(rays, |at| !found[at]);
         for (signature, together) in sorted.packets() {
-            if signature == ALONE || together.len() < LEAST {
+            if signature == ALONE || together.len() < LEAST || !coherence.tries() {
                 for &at in together {
                     let at = usize::from(at);
                     let mut query = Occluded { found: false };
@@ -136,13 +176,14 @@ unsafe fn occluded<L: Rows>(tree: &Tree, rays: &[Ray], clips: &[Interval], found
                 continue;
             }
             // SAFETY: as the caller promises; the places are within the chunk.
-            let alive = unsafe {
+            let packet = unsafe {
                 let mut packet = Packet::<L>::new(&asked, together, AXES[usize::from(signature % 3)], &[]);
                 packet::walk::<L, true>(tree, &mut packet);
-                packet.alive
+                packet
             };
+            coherence.saw(packet.boxes, packet.met);
             for (lane, &at) in together.iter().enumerate() {
-                found[usize::from(at)] = alive >> lane & 1 == 0;
+                found[usize::from(at)] = packet.alive >> lane & 1 == 0;
             }
         }
     }

@@ -55,6 +55,9 @@ pub struct Packet<'a, L: Rows> {
     pub best_primitive: L::Row,
     /// A bit for each ray that still looks for something.
     pub alive: u32,
+    /// Boxes that some of the rays met, and how many of these there were, all added up.
+    pub boxes: u32,
+    pub met: u32,
     pub axes: [usize; 3],
     /// The number that hits get.
     pub instance: u32,
@@ -170,6 +173,8 @@ impl<'a, L: Rows> Packet<'a, L> {
                 best_instance: miss,
                 best_primitive: miss,
                 alive: (1 << at.len()) - 1,
+                boxes: 0,
+                met: 0,
                 axes,
                 instance: asked.instance,
                 is_clipped: !asked.clips.is_empty(),
@@ -376,6 +381,8 @@ pub unsafe fn walk<L: Rows, const ANY: bool>(tree: &Tree, packet: &mut Packet<'_
                     continue;
                 }
                 current = Child(top.entry as u32);
+                packet.boxes += 1;
+                packet.met += lanes.count_ones();
                 if lanes.count_ones() > FEW {
                     break;
                 }
