@@ -2,8 +2,10 @@
 
 use std::arch::x86_64::*;
 
+use super::packet::{self, Packet};
 use super::single::Query;
 use super::{Lanes, Rows, leaf};
+use crate::accel::wide::Tree;
 use crate::accel::wide::node::Child;
 use crate::geometry::PreparedRay;
 
@@ -106,6 +108,37 @@ impl Rows for Avx512 {
     #[inline(always)]
     unsafe fn row(x: f32) -> __m512 {
         unsafe { _mm512_set1_ps(x) }
+    }
+
+    // The evens and then the odds of eight.
+    const ORDER: [u16; 16] = [0, 2, 4, 6, 1, 3, 5, 7, 8, 10, 12, 14, 9, 11, 13, 15];
+
+    #[inline(always)]
+    unsafe fn row_records(records: *const f32) -> [__m512; 8] {
+        unsafe {
+            // Two records a register; four by four words are transposed in each quarter of four registers.
+            let mut quarters = [[_mm512_setzero_ps(); 4]; 2];
+            for (half, quarters) in quarters.iter_mut().enumerate() {
+                let first = records.add(64 * half);
+                let (a, b) = (_mm512_loadu_ps(first), _mm512_loadu_ps(first.add(16)));
+                let (c, d) = (_mm512_loadu_ps(first.add(32)), _mm512_loadu_ps(first.add(48)));
+                let (ab, cd) = (_mm512_unpacklo_ps(a, b), _mm512_unpacklo_ps(c, d));
+                let (ef, gh) = (_mm512_unpackhi_ps(a, b), _mm512_unpackhi_ps(c, d));
+                *quarters = [
+                    _mm512_shuffle_ps::<0b01_00_01_00>(ab, cd),
+                    _mm512_shuffle_ps::<0b11_10_11_10>(ab, cd),
+                    _mm512_shuffle_ps::<0b01_00_01_00>(ef, gh),
+                    _mm512_shuffle_ps::<0b11_10_11_10>(ef, gh),
+                ];
+            }
+            let mut rows = [_mm512_setzero_ps(); 8];
+            for word in 0..4 {
+                let (first, last) = (quarters[0][word], quarters[1][word]);
+                rows[word] = _mm512_shuffle_f32x4::<0b10_00_10_00>(first, last);
+                rows[word + 4] = _mm512_shuffle_f32x4::<0b11_01_11_01>(first, last);
+            }
+            rows
+        }
     }
 
     #[inline(always)]
@@ -239,6 +272,13 @@ impl Rows for Avx512 {
     unsafe fn double_less(a: __m512d, b: __m512d) -> u32 {
         unsafe { u32::from(_mm512_cmp_pd_mask::<_CMP_LT_OQ>(a, b)) }
     }
+
+    #[inline(never)]
+    #[target_feature(enable = "avx512f,avx512vl,avx512dq,bmi1,popcnt")]
+    unsafe fn walk_packet<const ANY: bool>(tree: &Tree, packet: &mut Packet<'_, Self>) {
+        // SAFETY: as the caller promises.
+        unsafe { packet::walk::<Self, ANY>(tree, packet) }
+    }
 }
 
 // SAFETY, of each block: as above.
@@ -249,6 +289,38 @@ impl Rows for Avx2 {
     #[inline(always)]
     unsafe fn row(x: f32) -> [__m256; 2] {
         unsafe { [_mm256_set1_ps(x); 2] }
+    }
+
+    const ORDER: [u16; 16] = [0, 2, 4, 6, 1, 3, 5, 7, 8, 10, 12, 14, 9, 11, 13, 15];
+
+    #[inline(always)]
+    unsafe fn row_records(records: *const f32) -> [[__m256; 2]; 8] {
+        unsafe {
+            let mut rows = [[_mm256_setzero_ps(); 2]; 8];
+            for half in 0..2 {
+                // A record a register, the evens and then the odds; four by four words are transposed in each half of four registers.
+                let mut halves = [[_mm256_setzero_ps(); 4]; 2];
+                for (odd, halves) in halves.iter_mut().enumerate() {
+                    let first = records.add(64 * half + 8 * odd);
+                    let (a, b) = (_mm256_loadu_ps(first), _mm256_loadu_ps(first.add(16)));
+                    let (c, d) = (_mm256_loadu_ps(first.add(32)), _mm256_loadu_ps(first.add(48)));
+                    let (ab, cd) = (_mm256_unpacklo_ps(a, b), _mm256_unpacklo_ps(c, d));
+                    let (ef, gh) = (_mm256_unpackhi_ps(a, b), _mm256_unpackhi_ps(c, d));
+                    *halves = [
+                        _mm256_shuffle_ps::<0b01_00_01_00>(ab, cd),
+                        _mm256_shuffle_ps::<0b11_10_11_10>(ab, cd),
+                        _mm256_shuffle_ps::<0b01_00_01_00>(ef, gh),
+                        _mm256_shuffle_ps::<0b11_10_11_10>(ef, gh),
+                    ];
+                }
+                for word in 0..4 {
+                    let (evens, odds) = (halves[0][word], halves[1][word]);
+                    rows[word][half] = _mm256_permute2f128_ps::<0x20>(evens, odds);
+                    rows[word + 4][half] = _mm256_permute2f128_ps::<0x31>(evens, odds);
+                }
+            }
+            rows
+        }
     }
 
     #[inline(always)]
@@ -417,5 +489,12 @@ impl Rows for Avx2 {
             let last = _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(a[1], b[1])) as u32;
             first | last << 4
         }
+    }
+
+    #[inline(never)]
+    #[target_feature(enable = "avx2,bmi1,popcnt")]
+    unsafe fn walk_packet<const ANY: bool>(tree: &Tree, packet: &mut Packet<'_, Self>) {
+        // SAFETY: as the caller promises.
+        unsafe { packet::walk::<Self, ANY>(tree, packet) }
     }
 }

@@ -1,6 +1,6 @@
 //! Many rays at once: those that go alike together in packets, the others one by one.
 
-use super::packet::{self, Asked, Packet, RAYS};
+use super::packet::{Asked, Packet, RAYS};
 use super::single::{Closest, Occluded, Query, walk};
 use super::{Level, Portable, Rows, Set};
 use crate::accel::wide::Tree;
@@ -129,27 +129,34 @@ unsafe fn closest<L: Rows>(tree: &Tree, rays: &[Ray], clips: &[Interval], instan
     for (number, (rays, best)) in rays.chunks(CHUNK).zip(best.chunks_mut(CHUNK)).enumerate() {
         let clips = if clips.is_empty() { clips } else { &clips[number * CHUNK..number * CHUNK + rays.len()] };
         let asked = Asked { rays, clips, instance };
-        let sorted = Sorted::new(rays, |_| true);
-        for (signature, together) in sorted.packets() {
-            if signature == ALONE || together.len() < LEAST || !coherence.tries() {
-                for &at in together {
+        // SAFETY, of each block: as the caller promises; places are within the chunk.
+        let mut rest = Places::new();
+        for start in (0..rays.len()).step_by(RAYS) {
+            let together = unsafe { Together::<L>::new(rays, start).filter(|_| coherence.tries()) };
+            let Some(Together { at, axes, rows }) = together else {
+                rest.extend(start, rays.len());
+                continue;
+            };
+            let fresh = best[start..start + RAYS].iter().all(|hit| !hit.is_hit());
+            unsafe {
+                let packet = Packet::<L>::new(&asked, &at, axes, rows, if fresh { &[] } else { best });
+                find_first(tree, packet, best, &mut coherence);
+            }
+        }
+        let sorted = Sorted::new(rays, &rest);
+        for (signature, at) in sorted.packets() {
+            if signature == ALONE || at.len() < LEAST || !coherence.tries() {
+                for &at in at {
                     let at = usize::from(at);
-                    let mut query = Closest { instance, best: &mut best[at] };
-                    // SAFETY: as the caller promises.
-                    unsafe { one::<L, _>(tree, &rays[at], clips.get(at), &mut query) }
+                    unsafe {
+                        one::<L, _>(tree, &rays[at], clips.get(at), &mut Closest { instance, best: &mut best[at] })
+                    }
                 }
                 continue;
             }
-            // SAFETY: as the caller promises; the places are within the chunk.
-            let packet = unsafe {
-                let mut packet = Packet::<L>::new(&asked, together, AXES[usize::from(signature % 3)], best);
-                packet::walk::<L, false>(tree, &mut packet);
-                packet.finish();
-                packet
-            };
-            coherence.saw(packet.boxes, packet.met);
-            for (lane, &at) in together.iter().enumerate() {
-                best[usize::from(at)] = packet.best(lane);
+            unsafe {
+                let packet = Packet::<L>::gather(&asked, at, AXES[usize::from(signature % 3)], best);
+                find_first(tree, packet, best, &mut coherence);
             }
         }
     }
@@ -163,29 +170,66 @@ unsafe fn occluded<L: Rows>(tree: &Tree, rays: &[Ray], clips: &[Interval], found
     for (number, (rays, found)) in rays.chunks(CHUNK).zip(found.chunks_mut(CHUNK)).enumerate() {
         let clips = if clips.is_empty() { clips } else { &clips[number * CHUNK..number * CHUNK + rays.len()] };
         let asked = Asked { rays, clips, instance: 0 };
-        let sorted = Sorted::new(rays, |at| !found[at]);
-        for (signature, together) in sorted.packets() {
-            if signature == ALONE || together.len() < LEAST || !coherence.tries() {
-                for &at in together {
+        // SAFETY, of each block: as the caller promises; places are within the chunk.
+        let mut rest = Places::new();
+        for start in (0..rays.len()).step_by(RAYS) {
+            let end = (start + RAYS).min(rays.len());
+            let together = if found[start..end].contains(&true) {
+                None
+            } else {
+                unsafe { Together::<L>::new(rays, start).filter(|_| coherence.tries()) }
+            };
+            match together {
+                Some(Together { at, axes, rows }) => {
+                    let packet = unsafe { Packet::<L>::new(&asked, &at, axes, rows, &[]) };
+                    unsafe { find_any(tree, packet, found, &mut coherence) }
+                }
+                None => (start..end).filter(|&at| !found[at]).for_each(|at| rest.push(at)),
+            }
+        }
+        let sorted = Sorted::new(rays, &rest);
+        for (signature, at) in sorted.packets() {
+            if signature == ALONE || at.len() < LEAST || !coherence.tries() {
+                for &at in at {
                     let at = usize::from(at);
                     let mut query = Occluded { found: false };
-                    // SAFETY: as the caller promises.
                     unsafe { one::<L, _>(tree, &rays[at], clips.get(at), &mut query) }
                     found[at] = query.found;
                 }
                 continue;
             }
-            // SAFETY: as the caller promises; the places are within the chunk.
-            let packet = unsafe {
-                let mut packet = Packet::<L>::new(&asked, together, AXES[usize::from(signature % 3)], &[]);
-                packet::walk::<L, true>(tree, &mut packet);
-                packet
-            };
-            coherence.saw(packet.boxes, packet.met);
-            for (lane, &at) in together.iter().enumerate() {
-                found[usize::from(at)] = packet.alive >> lane & 1 == 0;
+            unsafe {
+                let packet = Packet::<L>::gather(&asked, at, AXES[usize::from(signature % 3)], &[]);
+                find_any(tree, packet, found, &mut coherence);
             }
         }
+    }
+}
+
+/// # Safety
+/// As for [`closest`]; the packet's places are within `best`.
+#[inline(always)]
+unsafe fn find_first<L: Rows>(tree: &Tree, mut packet: Packet<'_, L>, best: &mut [Hit], coherence: &mut Coherence) {
+    // SAFETY: as the caller promises.
+    unsafe {
+        L::walk_packet::<false>(tree, &mut packet);
+        packet.finish();
+    }
+    coherence.saw(packet.boxes, packet.met);
+    for (lane, &at) in packet.at.iter().enumerate() {
+        best[usize::from(at)] = packet.best(lane);
+    }
+}
+
+/// # Safety
+/// As for [`closest`]; the packet's places are within `found`.
+#[inline(always)]
+unsafe fn find_any<L: Rows>(tree: &Tree, mut packet: Packet<'_, L>, found: &mut [bool], coherence: &mut Coherence) {
+    // SAFETY: as the caller promises.
+    unsafe { L::walk_packet::<true>(tree, &mut packet) }
+    coherence.saw(packet.boxes, packet.met);
+    for (lane, &at) in packet.at.iter().enumerate() {
+        found[usize::from(at)] = packet.alive >> lane & 1 == 0;
     }
 }
 
@@ -199,18 +243,92 @@ unsafe fn one<L: Rows, Q: Query>(tree: &Tree, ray: &Ray, clip: Option<&Interval>
     }
 }
 
-/// The places of a chunk.
-const IN_ORDER: [u16; CHUNK] = {
-    let mut places = [0; CHUNK];
-    let mut at = 0;
-    while at < CHUNK {
-        places[at] = at as u16;
-        at += 1;
-    }
-    places
-};
+/// Sixteen rays that follow each other and are of one signature.
+struct Together<L: Rows> {
+    /// The rays' places by lane.
+    at: [u16; RAYS],
+    axes: [usize; 3],
+    /// The rays' words.
+    rows: [L::Row; 8],
+}
 
-/// The places of rays by their signature, in order within each.
+impl<L: Rows> Together<L> {
+    /// The rays from `start` on, if there are as many and they have the same [`signature`], other than [`ALONE`].
+    ///
+    /// # Safety
+    /// The processor has the instructions of `L`.
+    #[inline(always)]
+    unsafe fn new(rays: &[Ray], start: usize) -> Option<Self> {
+        const ALL: u32 = (1 << RAYS) - 1;
+        let own = rays.get(start..start + RAYS)?;
+        unsafe {
+            let rows = L::row_records(own.as_ptr().cast());
+            let [x, y, z, t_min, dx, dy, dz, t_max] = rows;
+            let (zero, largest, least) = (L::row(0.0), L::row(f32::MAX), L::row(PARALLEL));
+            let mut good = L::row_at_most(t_min, t_max) & L::row_at_most(zero, t_max);
+            let mut alike = true;
+            let mut magnitudes = [zero; 3];
+            for (axis, (origin, direction)) in [(x, dx), (y, dy), (z, dz)].into_iter().enumerate() {
+                // Of a NaN both are NaN.
+                let from_zero = L::row_greater(origin, L::row_sub(zero, origin));
+                let magnitude = L::row_greater(direction, L::row_sub(zero, direction));
+                good &= L::row_at_most(from_zero, largest);
+                good &= L::row_at_most(magnitude, largest) & L::row_at_most(least, magnitude);
+                let negative = L::row_less(direction, zero);
+                alike &= negative == 0 || negative == ALL;
+                magnitudes[axis] = magnitude;
+            }
+            // As `largest_axis`.
+            let [x, y, z] = magnitudes;
+            let first = L::row_less(y, x);
+            let not_last = L::row_less(z, L::row_greater(x, y));
+            let axis = match (not_last, first) {
+                (0, _) => 2,
+                (ALL, ALL) => 0,
+                (ALL, 0) => 1,
+                _ => return None,
+            };
+            if good != ALL || !alike {
+                return None;
+            }
+            let mut at = [start as u16; RAYS];
+            for (at, place) in at.iter_mut().zip(L::ORDER) {
+                *at += place;
+            }
+            Some(Self { at, axes: AXES[axis], rows })
+        }
+    }
+}
+
+/// Places in a chunk.
+struct Places {
+    places: [u16; CHUNK],
+    count: usize,
+}
+
+impl Places {
+    fn new() -> Self {
+        Self { places: [0; CHUNK], count: 0 }
+    }
+
+    #[inline(always)]
+    fn push(&mut self, place: usize) {
+        self.places[self.count] = place as u16;
+        self.count += 1;
+    }
+
+    /// Adds as many as a packet may have, and no more than there are rays.
+    #[inline(always)]
+    fn extend(&mut self, start: usize, rays: usize) {
+        (start..(start + RAYS).min(rays)).for_each(|place| self.push(place));
+    }
+
+    fn as_slice(&self) -> &[u16] {
+        &self.places[..self.count]
+    }
+}
+
+/// Places of rays by their signature, in order within each.
 struct Sorted {
     places: [u16; CHUNK],
     /// Where each signature begins, and the end.
@@ -219,21 +337,12 @@ struct Sorted {
 
 impl Sorted {
     #[inline(always)]
-    fn new(rays: &[Ray], wanted: impl Fn(usize) -> bool) -> Self {
+    fn new(rays: &[Ray], of: &Places) -> Self {
         let mut signatures = [0; CHUNK];
-        let mut differs = 0;
-        for (at, ray) in rays.iter().enumerate() {
-            // Those that are not wanted come after the last.
-            signatures[at] = if wanted(at) { signature(ray) } else { ALONE + 1 };
-            differs |= signatures[at] ^ signatures[0];
-        }
         let mut starts = [0u16; ALONE as usize + 2];
-        if differs == 0 {
-            starts[usize::from(signatures[0]) + 1..].fill(rays.len() as u16);
-            return Self { places: IN_ORDER, starts };
-        }
-        for signature in &signatures[..rays.len()] {
-            starts[usize::from(*signature)] += 1;
+        for (signature_of, &place) in signatures.iter_mut().zip(of.as_slice()) {
+            *signature_of = signature(&rays[usize::from(place)]);
+            starts[usize::from(*signature_of)] += 1;
         }
         let mut sum = 0;
         for start in &mut starts {
@@ -242,10 +351,10 @@ impl Sorted {
         }
         let mut places = [0; CHUNK];
         let mut next = starts;
-        for (at, signature) in signatures[..rays.len()].iter().enumerate() {
-            let place = &mut next[usize::from(*signature)];
-            places[usize::from(*place)] = at as u16;
-            *place += 1;
+        for (signature, &place) in signatures.iter().zip(of.as_slice()) {
+            let at = &mut next[usize::from(*signature)];
+            places[usize::from(*at)] = place;
+            *at += 1;
         }
         Self { places, starts }
     }

@@ -20,8 +20,11 @@ pub use single::{Closest, NextAfter, Occluded, search, search_alone};
 
 use std::sync::OnceLock;
 
+use packet::Packet;
 use portable::Portable;
 use single::Query;
+
+use super::Tree;
 
 use super::node::Child;
 use crate::geometry::PreparedRay;
@@ -132,6 +135,11 @@ trait Rows: Lanes {
 
     /// The same number sixteen times.
     unsafe fn row(x: f32) -> Self::Row;
+    /// In which order [`row_records`](Self::row_records) puts records into lanes.
+    const ORDER: [u16; 16];
+
+    /// Sixteen records of eight words that follow each other, a row a word.
+    unsafe fn row_records(records: *const f32) -> [Self::Row; 8];
     /// The first N words of sixteen records, a row a word: those at `places`, each of `size` words.
     unsafe fn row_gather<const N: usize>(records: *const f32, places: &[i32; 16], size: i32) -> [Self::Row; N];
     /// `a - b`
@@ -183,4 +191,9 @@ trait Rows: Lanes {
     unsafe fn double_select(bits: u32, a: Self::Double, b: Self::Double) -> Self::Double;
     /// A bit a lane: `a < b`.
     unsafe fn double_less(a: Self::Double, b: Self::Double) -> u32;
+
+    /// [`packet::walk`] compiled for the set, and only once.
+    unsafe fn walk_packet<const ANY: bool>(tree: &Tree, packet: &mut Packet<'_, Self>)
+    where
+        Self: Sized;
 }

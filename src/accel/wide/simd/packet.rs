@@ -68,7 +68,8 @@ pub struct Packet<'a, L: Rows> {
     leave: [usize; 3],
     extremes: [Extremes; 3],
     asked: &'a Asked<'a>,
-    at: &'a [u16],
+    /// The rays' places by lane.
+    pub at: &'a [u16],
 }
 
 /// Rays, what they have found, and how.
@@ -88,6 +89,19 @@ struct Extremes {
     origin_far: f32,
     inverse: [f32; 2],
     inverse_far: [f32; 2],
+}
+
+/// 32-bit words of a ray: origin, `t_min`, direction, `t_max`.
+const WORDS_OF_RAY: i32 = (size_of::<Ray>() / 4) as i32;
+
+/// The places of at most sixteen rays; lanes without a ray have the first one's.
+#[inline(always)]
+fn places(at: &[u16]) -> [i32; RAYS] {
+    let mut places = [i32::from(at[0]); RAYS];
+    for (place, &at) in places.iter_mut().zip(at) {
+        *place = i32::from(at);
+    }
+    places
 }
 
 /// A lane of a row.
@@ -112,19 +126,28 @@ impl<'a, L: Rows> Packet<'a, L> {
     /// # Safety
     /// The processor has the instructions of `L`, and the places are within the rays.
     #[inline(always)]
-    pub unsafe fn new(asked: &'a Asked<'a>, at: &'a [u16], axes: [usize; 3], best: &[Hit]) -> Self {
-        const RAY: i32 = (size_of::<Ray>() / 4) as i32;
+    pub unsafe fn gather(asked: &'a Asked<'a>, at: &'a [u16], axes: [usize; 3], best: &[Hit]) -> Self {
+        unsafe {
+            let rows = L::row_gather(asked.rays.as_ptr().cast(), &places(at), WORDS_OF_RAY);
+            Self::new(asked, at, axes, rows, best)
+        }
+    }
+
+    /// The same with the rays' words.
+    ///
+    /// # Safety
+    /// As for [`gather`](Self::gather).
+    #[inline(always)]
+    pub unsafe fn new(
+        asked: &'a Asked<'a>,
+        at: &'a [u16],
+        axes: [usize; 3],
+        [x, y, z, t_min, dx, dy, dz, t_max]: [L::Row; 8],
+        best: &[Hit],
+    ) -> Self {
         const HIT: i32 = (size_of::<Hit>() / 4) as i32;
         const CLIP: i32 = (size_of::<Interval>() / 4) as i32;
         unsafe {
-            // Lanes without a ray have the first one's.
-            let mut places = [i32::from(at[0]); RAYS];
-            for (place, &at) in places.iter_mut().zip(at) {
-                *place = i32::from(at);
-            }
-            let rays: *const f32 = asked.rays.as_ptr().cast();
-            let rows = L::row_gather(rays, &places, RAY);
-            let [x, y, z, t_min, dx, dy, dz, t_max] = rows;
             let (origin, direction) = ([x, y, z], [dx, dy, dz]);
             let one = L::row(1.0);
             let zero = L::row(0.0);
@@ -185,12 +208,12 @@ impl<'a, L: Rows> Packet<'a, L> {
                 at,
             };
             if !best.is_empty() {
-                let [t, u, v, instance, primitive] = L::row_gather(best.as_ptr().cast(), &places, HIT);
+                let [t, u, v, instance, primitive] = L::row_gather(best.as_ptr().cast(), &places(at), HIT);
                 (packet.best_t, packet.best_u, packet.best_v) = (t, u, v);
                 (packet.best_instance, packet.best_primitive) = (instance, primitive);
             }
             if packet.is_clipped {
-                let [near, far] = L::row_gather(asked.clips.as_ptr().cast(), &places, CLIP);
+                let [near, far] = L::row_gather(asked.clips.as_ptr().cast(), &places(at), CLIP);
                 (packet.clip_near, packet.clip_far) = (near, far);
                 packet.near = L::row_select(L::row_at_most(t_min, near), t_min, minus_infinity);
             }

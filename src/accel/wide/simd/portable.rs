@@ -1,7 +1,9 @@
 //! Eight lanes as an array: what every processor can do, and what the other sets are compared with.
 
+use super::packet::{self, Packet};
 use super::single::Query;
 use super::{Lanes, Rows, leaf};
+use crate::accel::wide::Tree;
 use crate::accel::wide::node::Child;
 use crate::geometry::PreparedRay;
 
@@ -92,6 +94,14 @@ impl Rows for Portable {
     #[inline(always)]
     unsafe fn row(x: f32) -> [f32; 16] {
         [x; 16]
+    }
+
+    const ORDER: [u16; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
+
+    #[inline(always)]
+    unsafe fn row_records(records: *const f32) -> [[f32; 16]; 8] {
+        // SAFETY: the caller points to sixteen records.
+        std::array::from_fn(|word| std::array::from_fn(|lane| unsafe { *records.add(8 * lane + word) }))
     }
 
     #[inline(always)]
@@ -218,5 +228,11 @@ impl Rows for Portable {
     #[inline(always)]
     unsafe fn double_less(a: [f64; 8], b: [f64; 8]) -> u32 {
         bits(a, b, f64::lt)
+    }
+
+    #[inline(never)]
+    unsafe fn walk_packet<const ANY: bool>(tree: &Tree, packet: &mut Packet<'_, Self>) {
+        // SAFETY: as the caller promises.
+        unsafe { packet::walk::<Self, ANY>(tree, packet) }
     }
 }
