@@ -2,7 +2,7 @@
 //! time.
 //!
 //! ```text
-//! Topology (ploc) -> Collapse -> Node, Leaves -> Tree -> simd::{single}
+//! Topology (ploc) -> Collapse -> Node, Leaves -> Tree -> simd::{single, packet, batch}
 //! ```
 
 mod collapse;
@@ -32,6 +32,18 @@ pub struct Tree {
     nodes: Vec<Node>,
     leaves: Leaves,
     root: Child,
+    /// Whether a search waits for memory at every step, so that scattered rays had better take turns.
+    is_large: bool,
+}
+
+impl Tree {
+    /// Bytes of a tree that does not stay in the caches: turns made scattered rays 1.37 times as fast in 208 MB, and 0.95 times in 44 MB.
+    const LARGE: usize = 64 << 20;
+
+    fn new(nodes: Vec<Node>, leaves: Leaves, root: Child) -> Self {
+        let is_large = size_of_val(nodes.as_slice()) + size_of_val(leaves.words()) >= Self::LARGE;
+        Self { nodes, leaves, root, is_large }
+    }
 }
 
 /// An 8-wide tree with exact boxes.
@@ -46,6 +58,13 @@ impl Wide {
     #[cfg(test)]
     fn with_level(mut self, level: Level) -> Self {
         self.level = level;
+        self
+    }
+
+    /// The same tree taken for a large one.
+    #[cfg(test)]
+    fn with_turns(mut self) -> Self {
+        self.tree.is_large = true;
         self
     }
 }
@@ -69,7 +88,7 @@ impl TriangleAccelerator for Wide {
         let mut collapse = Collapse::new(&topology, &triangles);
         let root = collapse.run();
         let bounds = topology.nodes.first().map_or(Bounds::EMPTY, |root| root.bounds);
-        let tree = Tree { nodes: collapse.nodes, leaves: collapse.leaves, root };
+        let tree = Tree::new(collapse.nodes, collapse.leaves, root);
         share.reach(100)?;
         let wide = Self { tree, bounds, level: Level::chosen() };
         debug_assert_eq!(wide.validate(), Ok(()), "{}", Self::NAME);

@@ -124,8 +124,10 @@ fn packets_give_the_hits_of_the_reference() {
             );
             for level in Level::available() {
                 let wide = Wide::build(&mesh, &params, &Silent).unwrap().with_level(level);
+                let large = Wide::build(&mesh, &params, &Silent).unwrap().with_level(level).with_turns();
                 // Whole packets, and what is left over.
-                for size in [asked.len(), 16, 21] {
+                for (wide, size) in [(&wide, asked.len()), (&wide, 16), (&wide, 21), (&large, asked.len()), (&large, 3)]
+                {
                     let mut hits = vec![Hit::MISS; asked.len()];
                     let mut occluded = vec![false; asked.len()];
                     for (at, rays) in asked.chunks(size).enumerate() {
@@ -185,7 +187,7 @@ fn deep_ends_are_cut_evenly() {
     let triangles: Vec<_> = live.iter().map(|&number| LeafTriangle::new(&mesh, number)).collect();
     let mut collapse = Collapse::new(&topology, &triangles);
     let root = collapse.run();
-    let tree = Tree { nodes: collapse.nodes, leaves: collapse.leaves, root };
+    let tree = Tree::new(collapse.nodes, collapse.leaves, root);
     let wide = Wide { tree, bounds: topology.nodes[0].bounds, level: Level::chosen() };
     assert_eq!(wide.validate(), Ok(()));
     assert!(wide.stats().max_depth > 30 && wide.stats().max_depth as usize <= MOST_DEPTH);

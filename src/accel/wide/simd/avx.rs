@@ -77,6 +77,11 @@ macro_rules! lanes_of_256_bits {
                 unsafe { $less }
             }
 
+            #[inline(always)]
+            unsafe fn prefetch(from: *const u8) {
+                unsafe { _mm_prefetch::<_MM_HINT_T0>(from.cast()) }
+            }
+
             #[inline(never)]
             #[target_feature(enable = $features)]
             unsafe fn meet_leaf<Q: Query>(words: *const u32, leaf: Child, ray: &PreparedRay, query: &mut Q) -> bool {
@@ -281,6 +286,38 @@ impl Rows for Avx512 {
     }
 }
 
+/// Eight records of eight words, a register a word: of the records the evens and then the odds.
+///
+/// # Safety
+/// The processor has AVX2, and the records can be read.
+#[inline(always)]
+unsafe fn eight_records(records: *const f32) -> [__m256; 8] {
+    unsafe {
+        // A record a register, the evens and then the odds; four by four words are transposed in each half of four registers.
+        let mut halves = [[_mm256_setzero_ps(); 4]; 2];
+        for (odd, halves) in halves.iter_mut().enumerate() {
+            let first = records.add(8 * odd);
+            let (a, b) = (_mm256_loadu_ps(first), _mm256_loadu_ps(first.add(16)));
+            let (c, d) = (_mm256_loadu_ps(first.add(32)), _mm256_loadu_ps(first.add(48)));
+            let (ab, cd) = (_mm256_unpacklo_ps(a, b), _mm256_unpacklo_ps(c, d));
+            let (ef, gh) = (_mm256_unpackhi_ps(a, b), _mm256_unpackhi_ps(c, d));
+            *halves = [
+                _mm256_shuffle_ps::<0b01_00_01_00>(ab, cd),
+                _mm256_shuffle_ps::<0b11_10_11_10>(ab, cd),
+                _mm256_shuffle_ps::<0b01_00_01_00>(ef, gh),
+                _mm256_shuffle_ps::<0b11_10_11_10>(ef, gh),
+            ];
+        }
+        let mut words = [_mm256_setzero_ps(); 8];
+        for word in 0..4 {
+            let (evens, odds) = (halves[0][word], halves[1][word]);
+            words[word] = _mm256_permute2f128_ps::<0x20>(evens, odds);
+            words[word + 4] = _mm256_permute2f128_ps::<0x31>(evens, odds);
+        }
+        words
+    }
+}
+
 // SAFETY, of each block: as above.
 impl Rows for Avx2 {
     type Row = [__m256; 2];
@@ -296,28 +333,10 @@ impl Rows for Avx2 {
     #[inline(always)]
     unsafe fn row_records(records: *const f32) -> [[__m256; 2]; 8] {
         unsafe {
+            let (first, last) = (eight_records(records), eight_records(records.add(64)));
             let mut rows = [[_mm256_setzero_ps(); 2]; 8];
-            for half in 0..2 {
-                // A record a register, the evens and then the odds; four by four words are transposed in each half of four registers.
-                let mut halves = [[_mm256_setzero_ps(); 4]; 2];
-                for (odd, halves) in halves.iter_mut().enumerate() {
-                    let first = records.add(64 * half + 8 * odd);
-                    let (a, b) = (_mm256_loadu_ps(first), _mm256_loadu_ps(first.add(16)));
-                    let (c, d) = (_mm256_loadu_ps(first.add(32)), _mm256_loadu_ps(first.add(48)));
-                    let (ab, cd) = (_mm256_unpacklo_ps(a, b), _mm256_unpacklo_ps(c, d));
-                    let (ef, gh) = (_mm256_unpackhi_ps(a, b), _mm256_unpackhi_ps(c, d));
-                    *halves = [
-                        _mm256_shuffle_ps::<0b01_00_01_00>(ab, cd),
-                        _mm256_shuffle_ps::<0b11_10_11_10>(ab, cd),
-                        _mm256_shuffle_ps::<0b01_00_01_00>(ef, gh),
-                        _mm256_shuffle_ps::<0b11_10_11_10>(ef, gh),
-                    ];
-                }
-                for word in 0..4 {
-                    let (evens, odds) = (halves[0][word], halves[1][word]);
-                    rows[word][half] = _mm256_permute2f128_ps::<0x20>(evens, odds);
-                    rows[word + 4][half] = _mm256_permute2f128_ps::<0x31>(evens, odds);
-                }
+            for (row, halves) in rows.iter_mut().zip(first.into_iter().zip(last)) {
+                *row = halves.into();
             }
             rows
         }

@@ -1,14 +1,20 @@
 //! Many rays at once: those that go alike together in packets, the others one by one.
 
+use std::cell::Cell;
+use std::mem::MaybeUninit;
+
 use super::packet::{Asked, Packet, RAYS};
-use super::single::{Closest, Occluded, Query, walk};
-use super::{Level, Portable, Rows, Set};
+use super::single::{Closest, Flight, Kept, Occluded, Query, walk, walk_from};
+use super::{Lanes, Level, Portable, Rows, Set};
 use crate::accel::wide::Tree;
 use crate::geometry::ray::{AXES, Interval, largest_axis};
 use crate::geometry::{Hit, PreparedRay, Ray};
 
 /// Rays among which those that go alike are looked for.
 const CHUNK: usize = 1024;
+
+/// Searches that take turns, each while the others wait for memory.
+const FLIGHTS: usize = 8;
 
 /// Fewer rays that go alike are no packet.
 const LEAST: usize = 4;
@@ -44,7 +50,7 @@ impl Coherence {
     const LEAST_MET: u32 = 5;
 
     /// Packets that go alone after two that were not worth it.
-    const PAUSE: u32 = 14;
+    const PAUSE: u32 = 30;
 
     fn new() -> Self {
         Self { alone: 0, failed: false }
@@ -144,8 +150,9 @@ unsafe fn closest<L: Rows>(tree: &Tree, rays: &[Ray], clips: &[Interval], instan
             }
         }
         let sorted = Sorted::new(rays, &rest);
+        let mut scattered = Places::new();
         for (signature, at) in sorted.packets() {
-            if signature == ALONE || at.len() < LEAST || !coherence.tries() {
+            if signature == ALONE {
                 for &at in at {
                     let at = usize::from(at);
                     unsafe {
@@ -154,10 +161,20 @@ unsafe fn closest<L: Rows>(tree: &Tree, rays: &[Ray], clips: &[Interval], instan
                 }
                 continue;
             }
+            if at.len() < LEAST || !coherence.tries() {
+                at.iter().for_each(|&at| scattered.push(usize::from(at)));
+                continue;
+            }
             unsafe {
                 let packet = Packet::<L>::gather(&asked, at, AXES[usize::from(signature % 3)], best);
                 find_first(tree, packet, best, &mut coherence);
             }
+        }
+        let best = Cell::from_mut(best).as_slice_of_cells();
+        let kept = |&at: &u16| (at, Kept { instance, best: best[usize::from(at)].get() });
+        let searches = scattered.as_slice().iter().map(kept);
+        unsafe {
+            search_scattered::<L, Kept>(tree, rays, clips, searches, |at, query| best[usize::from(at)].set(query.best));
         }
     }
 }
@@ -188,8 +205,9 @@ unsafe fn occluded<L: Rows>(tree: &Tree, rays: &[Ray], clips: &[Interval], found
             }
         }
         let sorted = Sorted::new(rays, &rest);
+        let mut scattered = Places::new();
         for (signature, at) in sorted.packets() {
-            if signature == ALONE || at.len() < LEAST || !coherence.tries() {
+            if signature == ALONE {
                 for &at in at {
                     let at = usize::from(at);
                     let mut query = Occluded { found: false };
@@ -198,10 +216,20 @@ unsafe fn occluded<L: Rows>(tree: &Tree, rays: &[Ray], clips: &[Interval], found
                 }
                 continue;
             }
+            if at.len() < LEAST || !coherence.tries() {
+                at.iter().for_each(|&at| scattered.push(usize::from(at)));
+                continue;
+            }
             unsafe {
                 let packet = Packet::<L>::gather(&asked, at, AXES[usize::from(signature % 3)], &[]);
                 find_any(tree, packet, found, &mut coherence);
             }
+        }
+        let searches = scattered.as_slice().iter().map(|&at| (at, Occluded { found: false }));
+        unsafe {
+            search_scattered::<L, Occluded>(tree, rays, clips, searches, |at, query| {
+                found[usize::from(at)] = query.found
+            });
         }
     }
 }
@@ -230,6 +258,61 @@ unsafe fn find_any<L: Rows>(tree: &Tree, mut packet: Packet<'_, L>, found: &mut 
     coherence.saw(packet.boxes, packet.met);
     for (lane, &at) in packet.at.iter().enumerate() {
         found[usize::from(at)] = packet.alive >> lane & 1 == 0;
+    }
+}
+
+/// Searches for rays that go their own ways: in turns where the tree is so large that each would wait for memory.
+///
+/// # Safety
+/// As for [`closest`]; the places are within the rays, none of which runs along an axis.
+#[inline(always)]
+unsafe fn search_scattered<L: Lanes, Q: Query>(
+    tree: &Tree,
+    rays: &[Ray],
+    clips: &[Interval],
+    searches: impl Iterator<Item = (u16, Q)>,
+    mut finished: impl FnMut(u16, &Q),
+) {
+    let mut prepared = searches.filter_map(|(at, query)| {
+        Some((at, PreparedRay::clipped(&rays[usize::from(at)], clips.get(usize::from(at)))?, query))
+    });
+    if !tree.is_large {
+        for (at, ray, mut query) in prepared {
+            // SAFETY: as the caller promises.
+            unsafe { walk_from::<L, Q>(tree, tree.root, &ray, &mut query) }
+            finished(at, &query);
+        }
+        return;
+    }
+    let mut flights = [const { MaybeUninit::<Flight<Q>>::uninit() }; FLIGHTS];
+    let mut places = [0; FLIGHTS];
+    let mut under_way: [usize; FLIGHTS] = std::array::from_fn(|number| number);
+    let mut count = 0;
+    for (at, ray, query) in prepared.by_ref().take(FLIGHTS) {
+        Flight::begin(&mut flights[count], tree, ray, query);
+        places[count] = at;
+        count += 1;
+    }
+    while count > 0 {
+        let mut turn = 0;
+        while turn < count {
+            let number = under_way[turn];
+            // SAFETY: those under way have begun; else as the caller promises.
+            let flight = unsafe { flights[number].assume_init_mut() };
+            if unsafe { flight.step::<L>(tree) } {
+                turn += 1;
+                continue;
+            }
+            finished(places[number], &flight.query);
+            if let Some((at, ray, query)) = prepared.next() {
+                Flight::begin(&mut flights[number], tree, ray, query);
+                places[number] = at;
+                turn += 1;
+            } else {
+                count -= 1;
+                under_way.swap(turn, count);
+            }
+        }
     }
 }
 

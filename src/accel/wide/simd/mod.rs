@@ -119,6 +119,9 @@ trait Lanes {
     /// A bit a lane: `a < b`.
     unsafe fn less(a: Self::Vector, b: Self::Vector) -> u32;
 
+    /// Asks memory for a line that will be needed soon; any address will do.
+    unsafe fn prefetch(from: *const u8);
+
     /// [`leaf::meet_leaf`] compiled for the set, and kept out of the loop over nodes, which needs the registers.
     unsafe fn meet_leaf<Q: Query>(words: *const u32, leaf: Child, ray: &PreparedRay, query: &mut Q) -> bool;
 }

@@ -80,6 +80,9 @@ impl Lanes for Portable {
         bits(a, b, f32::lt)
     }
 
+    #[inline(always)]
+    unsafe fn prefetch(_: *const u8) {}
+
     #[inline(never)]
     unsafe fn meet_leaf<Q: Query>(words: *const u32, leaf: Child, ray: &PreparedRay, query: &mut Q) -> bool {
         // SAFETY: as the caller promises.

@@ -3,7 +3,7 @@
 use std::mem::MaybeUninit;
 
 use super::super::collapse::MOST_DEPTH;
-use super::super::node::{Child, NODE_SHIFT, Node, PLANE_BYTES, WIDTH};
+use super::super::node::{Child, NODE_SHIFT, Node, PLANE_BYTES, TRIANGLE_WORDS, WIDTH};
 use super::{Lanes, Level, Portable, Set};
 use crate::accel::wide::Tree;
 use crate::geometry::{Hit, Key, PreparedRay, Ray, TriangleHit};
@@ -51,6 +51,40 @@ impl Query for Closest<'_> {
             *self.best = hit;
         }
         false
+    }
+}
+
+/// The first hit, kept here.
+pub struct Kept {
+    /// The number to put into hits.
+    pub instance: u32,
+    /// The best so far.
+    pub best: Hit,
+}
+
+impl Kept {
+    #[inline(always)]
+    fn closest(&mut self) -> Closest<'_> {
+        Closest { instance: self.instance, best: &mut self.best }
+    }
+}
+
+impl Query for Kept {
+    const NEAR_FIRST: bool = Closest::NEAR_FIRST;
+
+    #[inline(always)]
+    fn near(&self, ray: &PreparedRay) -> f32 {
+        ray.lower_bound(ray.t_min)
+    }
+
+    #[inline(always)]
+    fn far(&self, ray: &PreparedRay) -> f32 {
+        ray.far_bound(self.best.t)
+    }
+
+    #[inline(always)]
+    fn offer(&mut self, hit: TriangleHit, primitive: u32) -> bool {
+        self.closest().offer(hit, primitive)
     }
 }
 
@@ -217,6 +251,155 @@ pub unsafe fn walk_from<L: Lanes, Q: Query>(tree: &Tree, child: Child, ray: &Pre
     unsafe { walk_nodes::<L, Q, false>(tree, child, ray, query) }
 }
 
+/// A ray as boxes are compared with it, spread over lanes.
+struct Spread<L: Lanes> {
+    near: L::Vector,
+    origin: [L::Vector; 3],
+    /// (o - b) (-1/d) is (b - o) (1/d) but for the sign of a zero, and subtracts straight from memory.
+    inverse: [L::Vector; 3],
+    inverse_far: [L::Vector; 3],
+    sides: Sides,
+}
+
+/// In bytes from a node's first: the planes that a ray enters and leaves through.
+#[derive(Clone, Copy)]
+pub struct Sides {
+    enter: [usize; 3],
+    leave: [usize; 3],
+}
+
+impl Sides {
+    /// Those of a ray.
+    #[inline(always)]
+    pub fn new(ray: &PreparedRay) -> Self {
+        let mut sides = Self { enter: [0; 3], leave: [0; 3] };
+        for axis in 0..3 {
+            let lower = 2 * axis * PLANE_BYTES;
+            let side = if ray.is_negative(axis) { PLANE_BYTES } else { 0 };
+            (sides.enter[axis], sides.leave[axis]) = (lower + side, lower + (PLANE_BYTES - side));
+        }
+        sides
+    }
+}
+
+impl<L: Lanes> Spread<L> {
+    #[inline(always)]
+    unsafe fn new(ray: &PreparedRay, near: f32, sides: Sides) -> Self {
+        // SAFETY: as the caller promises.
+        unsafe {
+            let (inverse, inverse_far) = (-ray.inverse, -ray.inverse_far);
+            Self {
+                near: L::splat(near),
+                origin: [L::splat(ray.origin.x), L::splat(ray.origin.y), L::splat(ray.origin.z)],
+                inverse: [L::splat(inverse.x), L::splat(inverse.y), L::splat(inverse.z)],
+                inverse_far: [L::splat(inverse_far.x), L::splat(inverse_far.y), L::splat(inverse_far.z)],
+                sides,
+            }
+        }
+    }
+}
+
+/// Compares a ray with the boxes of a node's children: returns the nearest that it meets, or [`Child::NONE`], and puts the others on
+/// the stack, in order if the query wants that. `PARALLEL` tells that the ray may run along an axis.
+///
+/// # Safety
+/// As for [`walk`]; the stack has room for [`WIDTH`] more.
+#[inline(always)]
+unsafe fn visit<L: Lanes, Q: Query, const PARALLEL: bool>(
+    node: &Node,
+    ray: &Spread<L>,
+    far: f32,
+    stack: *mut Entry,
+    height: &mut usize,
+) -> Child {
+    unsafe {
+        let planes: *const f32 = node.planes.as_ptr().cast();
+        let mut entries = [ray.near; 3];
+        let mut exits = [ray.near; 3];
+        for axis in 0..3 {
+            let entry = L::sub(ray.origin[axis], L::load(planes.byte_add(ray.sides.enter[axis])));
+            let exit = L::sub(ray.origin[axis], L::load(planes.byte_add(ray.sides.leave[axis])));
+            entries[axis] = L::mul(entry, ray.inverse[axis]);
+            exits[axis] = L::mul(exit, ray.inverse_far[axis]);
+        }
+        let ([x, y, z], [u, v, w]) = (entries, exits);
+        let far_lanes = L::splat(far);
+        let (first, last) = if PARALLEL {
+            // One by one, since a NaN must leave the running bound as it is.
+            (L::greater(z, L::greater(y, L::greater(x, ray.near))), L::lesser(w, L::lesser(v, L::lesser(u, far_lanes))))
+        } else {
+            // In pairs, which is sooner done.
+            (L::greater(L::greater(x, y), L::greater(z, ray.near)), L::lesser(L::lesser(u, v), L::lesser(w, far_lanes)))
+        };
+        let mut crossed = L::at_most(first, last);
+        if crossed == 0 {
+            return Child::NONE;
+        }
+        let children = node.children.as_ptr();
+        let lane = crossed.trailing_zeros() as usize;
+        crossed &= crossed - 1;
+        let child = *children.add(lane);
+        if crossed == 0 {
+            return child;
+        }
+        let mut nears = MaybeUninit::<[f32; WIDTH]>::uninit();
+        let nears: *mut f32 = nears.as_mut_ptr().cast();
+        L::store(nears, first);
+        let one = entry(*nears.add(lane), child);
+        let lane = crossed.trailing_zeros() as usize;
+        crossed &= crossed - 1;
+        let other = entry(*nears.add(lane), *children.add(lane));
+        if !Q::NEAR_FIRST {
+            stack.add(*height).write(other);
+            *height += 1;
+            while crossed != 0 {
+                let lane = crossed.trailing_zeros() as usize;
+                crossed &= crossed - 1;
+                stack.add(*height).write(entry(*nears.add(lane), *children.add(lane)));
+                *height += 1;
+            }
+            return entry_child(one);
+        }
+        // The nearest is next; the others go on the stack in order.
+        let (mut next, farther) = (one.min(other), one.max(other));
+        let base = *height;
+        stack.add(*height).write(farther);
+        *height += 1;
+        while crossed != 0 {
+            let lane = crossed.trailing_zeros() as usize;
+            crossed &= crossed - 1;
+            let one = entry(*nears.add(lane), *children.add(lane));
+            let farther = one.max(next);
+            next = one.min(next);
+            let mut at = *height;
+            *height += 1;
+            while at > base && *stack.add(at - 1) < farther {
+                *stack.add(at) = *stack.add(at - 1);
+                at -= 1;
+            }
+            stack.add(at).write(farther);
+        }
+        entry_child(next)
+    }
+}
+
+/// Takes the next child that may still count from the stack; [`Child::NONE`] if there is none.
+///
+/// # Safety
+/// The stack holds `height` entries.
+#[inline(always)]
+unsafe fn pop(stack: *const Entry, height: &mut usize, far: f32) -> Child {
+    while *height > 0 {
+        *height -= 1;
+        // SAFETY: as the caller promises.
+        let top = unsafe { *stack.add(*height) };
+        if entry_near(top) <= far {
+            return entry_child(top);
+        }
+    }
+    Child::NONE
+}
+
 /// The search; `PARALLEL` tells that the ray may run along an axis.
 ///
 /// # Safety
@@ -231,28 +414,13 @@ unsafe fn walk_nodes<L: Lanes, Q: Query, const PARALLEL: bool>(
     unsafe {
         let nodes: *const Node = tree.nodes.as_ptr();
         let words: *const u32 = tree.leaves.words().as_ptr();
-        let near = L::splat(query.near(ray));
+        let spread = Spread::<L>::new(ray, query.near(ray), Sides::new(ray));
         let mut far = query.far(ray);
-        let origin = [L::splat(ray.origin.x), L::splat(ray.origin.y), L::splat(ray.origin.z)];
-        // (o - b) (-1/d) is (b - o) (1/d) but for the sign of a zero, and subtracts straight from memory.
-        let inverse = [L::splat(-ray.inverse.x), L::splat(-ray.inverse.y), L::splat(-ray.inverse.z)];
-        let inverse_far = [L::splat(-ray.inverse_far.x), L::splat(-ray.inverse_far.y), L::splat(-ray.inverse_far.z)];
-        // In bytes from the node's first: the planes that the ray enters and leaves through.
-        let mut enter = [0; 3];
-        let mut leave = [0; 3];
-        for axis in 0..3 {
-            let lower = 2 * axis * PLANE_BYTES;
-            let side = if ray.is_negative(axis) { PLANE_BYTES } else { 0 };
-            (enter[axis], leave[axis]) = (lower + side, lower + (PLANE_BYTES - side));
-        }
-
         let mut stack = [const { MaybeUninit::<Entry>::uninit() }; STACK];
+        let stack: *mut Entry = stack.as_mut_ptr().cast();
         let mut height = 0;
         let mut current = start;
-        if current == Child::NONE {
-            return;
-        }
-        loop {
+        while current != Child::NONE {
             if current.is_leaf() {
                 if L::meet_leaf(words, current, ray, query) {
                     return;
@@ -260,94 +428,93 @@ unsafe fn walk_nodes<L: Lanes, Q: Query, const PARALLEL: bool>(
                 far = query.far(ray);
             } else {
                 let node = &*nodes.byte_add(current.number() << NODE_SHIFT);
-                let planes: *const f32 = node.planes.as_ptr().cast();
-                let mut entries = [near; 3];
-                let mut exits = [near; 3];
-                for axis in 0..3 {
-                    let entry = L::sub(origin[axis], L::load(planes.byte_add(enter[axis])));
-                    let exit = L::sub(origin[axis], L::load(planes.byte_add(leave[axis])));
-                    entries[axis] = L::mul(entry, inverse[axis]);
-                    exits[axis] = L::mul(exit, inverse_far[axis]);
-                }
-                let ([x, y, z], [u, v, w]) = (entries, exits);
-                let far_lanes = L::splat(far);
-                let (first, last) = if PARALLEL {
-                    // One by one, since a NaN must leave the running bound as it is.
-                    (
-                        L::greater(z, L::greater(y, L::greater(x, near))),
-                        L::lesser(w, L::lesser(v, L::lesser(u, far_lanes))),
-                    )
-                } else {
-                    // In pairs, which is sooner done.
-                    (
-                        L::greater(L::greater(x, y), L::greater(z, near)),
-                        L::lesser(L::lesser(u, v), L::lesser(w, far_lanes)),
-                    )
-                };
-                let mut crossed = L::at_most(first, last);
-                if crossed != 0 {
-                    let children = node.children.as_ptr();
-                    let lane = crossed.trailing_zeros() as usize;
-                    crossed &= crossed - 1;
-                    let child = *children.add(lane);
-                    if crossed == 0 {
-                        current = child;
-                        continue;
-                    }
-                    let mut nears = MaybeUninit::<[f32; WIDTH]>::uninit();
-                    let nears: *mut f32 = nears.as_mut_ptr().cast();
-                    L::store(nears, first);
-                    let one = entry(*nears.add(lane), child);
-                    let lane = crossed.trailing_zeros() as usize;
-                    crossed &= crossed - 1;
-                    let other = entry(*nears.add(lane), *children.add(lane));
-                    let stack: *mut Entry = stack.as_mut_ptr().cast();
-                    if !Q::NEAR_FIRST {
-                        stack.add(height).write(other);
-                        height += 1;
-                        while crossed != 0 {
-                            let lane = crossed.trailing_zeros() as usize;
-                            crossed &= crossed - 1;
-                            stack.add(height).write(entry(*nears.add(lane), *children.add(lane)));
-                            height += 1;
-                        }
-                        current = entry_child(one);
-                        continue;
-                    }
-                    // The nearest is next; the others go on the stack in order.
-                    let (mut next, farther) = (one.min(other), one.max(other));
-                    let base = height;
-                    stack.add(height).write(farther);
-                    height += 1;
-                    while crossed != 0 {
-                        let lane = crossed.trailing_zeros() as usize;
-                        crossed &= crossed - 1;
-                        let one = entry(*nears.add(lane), *children.add(lane));
-                        let farther = one.max(next);
-                        next = one.min(next);
-                        let mut at = height;
-                        height += 1;
-                        while at > base && *stack.add(at - 1) < farther {
-                            *stack.add(at) = *stack.add(at - 1);
-                            at -= 1;
-                        }
-                        stack.add(at).write(farther);
-                    }
-                    current = entry_child(next);
+                current = visit::<L, Q, PARALLEL>(node, &spread, far, stack, &mut height);
+                if current != Child::NONE {
                     continue;
                 }
             }
-            loop {
-                if height == 0 {
-                    return;
-                }
-                height -= 1;
-                let top = stack.get_unchecked(height).assume_init();
-                if entry_near(top) <= far {
-                    current = entry_child(top);
-                    break;
-                }
-            }
+            current = pop(stack, &mut height, far);
         }
     }
 }
+
+/// A search on its way, in turns with others: what it found, its ray and where it is.
+pub struct Flight<Q> {
+    /// What it looks for.
+    pub query: Q,
+    ray: PreparedRay,
+    near: f32,
+    far: f32,
+    sides: Sides,
+    /// [`Child::NONE`] once it has ended.
+    current: Child,
+    height: usize,
+    stack: [MaybeUninit<Entry>; STACK],
+}
+
+impl<Q: Query> Flight<Q> {
+    /// Puts a search at the root of a tree. The ray must not run along an axis.
+    #[inline(always)]
+    pub fn begin(place: &mut MaybeUninit<Self>, tree: &Tree, ray: PreparedRay, query: Q) {
+        debug_assert!(ray.inverse.is_finite());
+        let (near, far, sides) = (query.near(&ray), query.far(&ray), Sides::new(&ray));
+        let place = place.as_mut_ptr();
+        // SAFETY: all but the stack, which needs none, gets a value.
+        unsafe {
+            (&raw mut (*place).query).write(query);
+            (&raw mut (*place).ray).write(ray);
+            (&raw mut (*place).near).write(near);
+            (&raw mut (*place).far).write(far);
+            (&raw mut (*place).sides).write(sides);
+            (&raw mut (*place).current).write(tree.root);
+            (&raw mut (*place).height).write(0);
+        }
+    }
+
+    /// Goes on by one node or leaf, and asks memory for the next; false once the search has ended.
+    ///
+    /// # Safety
+    /// As for [`walk`].
+    #[inline(always)]
+    pub unsafe fn step<L: Lanes>(&mut self, tree: &Tree) -> bool {
+        unsafe {
+            let nodes: *const Node = tree.nodes.as_ptr();
+            let words: *const u32 = tree.leaves.words().as_ptr();
+            let stack: *mut Entry = self.stack.as_mut_ptr().cast();
+            if self.current == Child::NONE {
+                return false;
+            }
+            let mut next = Child::NONE;
+            if self.current.is_leaf() {
+                if L::meet_leaf(words, self.current, &self.ray, &mut self.query) {
+                    return false;
+                }
+                self.far = self.query.far(&self.ray);
+            } else {
+                let node = &*nodes.byte_add(self.current.number() << NODE_SHIFT);
+                let spread = Spread::<L>::new(&self.ray, self.near, self.sides);
+                next = visit::<L, Q, false>(node, &spread, self.far, stack, &mut self.height);
+            }
+            if next == Child::NONE {
+                next = pop(stack, &mut self.height, self.far);
+            }
+            self.current = next;
+            if next == Child::NONE {
+                return false;
+            }
+            let (from, lines) = if next.is_leaf() {
+                let from: *const u8 = words.add(next.first() * TRIANGLE_WORDS).cast();
+                (from, (next.count() * TRIANGLE_WORDS * 4).div_ceil(LINE))
+            } else {
+                (nodes.byte_add(next.number() << NODE_SHIFT).cast(), size_of::<Node>() / LINE)
+            };
+            for line in 0..lines {
+                L::prefetch(from.add(line * LINE));
+            }
+            true
+        }
+    }
+}
+
+/// Bytes that memory is asked for at once.
+const LINE: usize = 64;
