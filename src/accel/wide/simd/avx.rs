@@ -3,11 +3,12 @@
 use std::arch::x86_64::*;
 
 use super::packet::{self, Packet};
-use super::single::Query;
+use super::single::{self, Query};
 use super::{Lanes, Rows, leaf};
 use crate::accel::wide::Tree;
 use crate::accel::wide::node::Child;
-use crate::geometry::PreparedRay;
+use crate::geometry::ray::Interval;
+use crate::geometry::{PreparedRay, Ray};
 
 /// AVX2 and BMI1.
 pub struct Avx2;
@@ -80,6 +81,13 @@ macro_rules! lanes_of_256_bits {
             #[inline(always)]
             unsafe fn prefetch(from: *const u8) {
                 unsafe { _mm_prefetch::<_MM_HINT_T0>(from.cast()) }
+            }
+
+            #[inline(never)]
+            #[target_feature(enable = $features)]
+            unsafe fn search<Q: Query>(tree: &Tree, ray: &Ray, clip: Option<&Interval>, query: &mut Q) {
+                // SAFETY: as the caller promises.
+                unsafe { single::prepare_and_walk::<Self, Q>(tree, ray, clip, query) }
             }
 
             #[inline(never)]

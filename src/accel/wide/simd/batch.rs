@@ -4,7 +4,7 @@ use std::cell::Cell;
 use std::mem::MaybeUninit;
 
 use super::packet::{Asked, Packet, RAYS};
-use super::single::{Closest, Flight, Kept, Occluded, Query, walk, walk_from};
+use super::single::{Closest, Flight, Kept, Occluded, Query};
 use super::{Lanes, Level, Portable, Rows, Set};
 use crate::accel::wide::Tree;
 use crate::geometry::ray::{AXES, Interval, largest_axis};
@@ -47,7 +47,7 @@ struct Coherence {
 
 impl Coherence {
     /// A packet whose rays meet boxes with fewer than this many together is slower than they are alone.
-    const LEAST_MET: u32 = 5;
+    const LEAST_MET: u32 = 6;
 
     /// Packets that go alone after two that were not worth it.
     const PAUSE: u32 = 30;
@@ -150,19 +150,17 @@ unsafe fn closest<L: Rows>(tree: &Tree, rays: &[Ray], clips: &[Interval], instan
             }
         }
         let sorted = Sorted::new(rays, &rest);
-        let mut scattered = Places::new();
+        let mut scattered = Marks::new();
         for (signature, at) in sorted.packets() {
             if signature == ALONE {
                 for &at in at {
                     let at = usize::from(at);
-                    unsafe {
-                        one::<L, _>(tree, &rays[at], clips.get(at), &mut Closest { instance, best: &mut best[at] })
-                    }
+                    unsafe { L::search(tree, &rays[at], clips.get(at), &mut Closest { instance, best: &mut best[at] }) }
                 }
                 continue;
             }
             if at.len() < LEAST || !coherence.tries() {
-                at.iter().for_each(|&at| scattered.push(usize::from(at)));
+                scattered.extend(at);
                 continue;
             }
             unsafe {
@@ -171,10 +169,9 @@ unsafe fn closest<L: Rows>(tree: &Tree, rays: &[Ray], clips: &[Interval], instan
             }
         }
         let best = Cell::from_mut(best).as_slice_of_cells();
-        let kept = |&at: &u16| (at, Kept { instance, best: best[usize::from(at)].get() });
-        let searches = scattered.as_slice().iter().map(kept);
+        let searches = scattered.iter().map(|at| (at, Kept { instance, best: best[at].get() }));
         unsafe {
-            search_scattered::<L, Kept>(tree, rays, clips, searches, |at, query| best[usize::from(at)].set(query.best));
+            search_scattered::<L, Kept>(tree, rays, clips, searches, |at, query| best[at].set(query.best));
         }
     }
 }
@@ -205,19 +202,19 @@ unsafe fn occluded<L: Rows>(tree: &Tree, rays: &[Ray], clips: &[Interval], found
             }
         }
         let sorted = Sorted::new(rays, &rest);
-        let mut scattered = Places::new();
+        let mut scattered = Marks::new();
         for (signature, at) in sorted.packets() {
             if signature == ALONE {
                 for &at in at {
                     let at = usize::from(at);
                     let mut query = Occluded { found: false };
-                    unsafe { one::<L, _>(tree, &rays[at], clips.get(at), &mut query) }
+                    unsafe { L::search(tree, &rays[at], clips.get(at), &mut query) }
                     found[at] = query.found;
                 }
                 continue;
             }
             if at.len() < LEAST || !coherence.tries() {
-                at.iter().for_each(|&at| scattered.push(usize::from(at)));
+                scattered.extend(at);
                 continue;
             }
             unsafe {
@@ -225,11 +222,9 @@ unsafe fn occluded<L: Rows>(tree: &Tree, rays: &[Ray], clips: &[Interval], found
                 find_any(tree, packet, found, &mut coherence);
             }
         }
-        let searches = scattered.as_slice().iter().map(|&at| (at, Occluded { found: false }));
+        let searches = scattered.iter().map(|at| (at, Occluded { found: false }));
         unsafe {
-            search_scattered::<L, Occluded>(tree, rays, clips, searches, |at, query| {
-                found[usize::from(at)] = query.found
-            });
+            search_scattered::<L, Occluded>(tree, rays, clips, searches, |at, query| found[at] = query.found);
         }
     }
 }
@@ -270,20 +265,19 @@ unsafe fn search_scattered<L: Lanes, Q: Query>(
     tree: &Tree,
     rays: &[Ray],
     clips: &[Interval],
-    searches: impl Iterator<Item = (u16, Q)>,
-    mut finished: impl FnMut(u16, &Q),
+    searches: impl Iterator<Item = (usize, Q)>,
+    mut finished: impl FnMut(usize, &Q),
 ) {
-    let mut prepared = searches.filter_map(|(at, query)| {
-        Some((at, PreparedRay::clipped(&rays[usize::from(at)], clips.get(usize::from(at)))?, query))
-    });
     if !tree.is_large {
-        for (at, ray, mut query) in prepared {
+        for (at, mut query) in searches {
             // SAFETY: as the caller promises.
-            unsafe { walk_from::<L, Q>(tree, tree.root, &ray, &mut query) }
+            unsafe { L::search(tree, &rays[at], clips.get(at), &mut query) }
             finished(at, &query);
         }
         return;
     }
+    let mut prepared =
+        searches.filter_map(|(at, query)| Some((at, PreparedRay::clipped(&rays[at], clips.get(at))?, query)));
     let mut flights = [const { MaybeUninit::<Flight<Q>>::uninit() }; FLIGHTS];
     let mut places = [0; FLIGHTS];
     let mut under_way: [usize; FLIGHTS] = std::array::from_fn(|number| number);
@@ -313,16 +307,6 @@ unsafe fn search_scattered<L: Lanes, Q: Query>(
                 under_way.swap(turn, count);
             }
         }
-    }
-}
-
-/// # Safety
-/// As for [`closest`].
-#[inline(always)]
-unsafe fn one<L: Rows, Q: Query>(tree: &Tree, ray: &Ray, clip: Option<&Interval>, query: &mut Q) {
-    if let Some(ray) = PreparedRay::clipped(ray, clip) {
-        // SAFETY: as the caller promises.
-        unsafe { walk::<L, Q>(tree, &ray, query) }
     }
 }
 
@@ -380,6 +364,31 @@ impl<L: Rows> Together<L> {
             }
             Some(Self { at, axes: AXES[axis], rows })
         }
+    }
+}
+
+/// Places in a chunk, in order.
+struct Marks([u64; CHUNK / 64]);
+
+impl Marks {
+    fn new() -> Self {
+        Self([0; CHUNK / 64])
+    }
+
+    #[inline(always)]
+    fn extend(&mut self, places: &[u16]) {
+        for &place in places {
+            self.0[usize::from(place / 64)] |= 1 << (place % 64);
+        }
+    }
+
+    #[inline(always)]
+    fn iter(&self) -> impl Iterator<Item = usize> {
+        self.0.iter().enumerate().flat_map(|(word, &marks)| {
+            let left = |&marks: &u64| Some(marks & marks.wrapping_sub(1)).filter(|left| *left != 0);
+            let first = Some(marks).filter(|marks| *marks != 0);
+            std::iter::successors(first, left).map(move |marks| 64 * word + marks.trailing_zeros() as usize)
+        })
     }
 }
 

@@ -27,7 +27,8 @@ use single::Query;
 use super::Tree;
 
 use super::node::Child;
-use crate::geometry::PreparedRay;
+use crate::geometry::ray::Interval;
+use crate::geometry::{PreparedRay, Ray};
 
 /// The environment variable that forces an instruction set: `portable`, `avx2` or `avx512`.
 pub const VARIABLE: &str = "WHITTED_SIMD";
@@ -121,6 +122,9 @@ trait Lanes {
 
     /// Asks memory for a line that will be needed soon; any address will do.
     unsafe fn prefetch(from: *const u8);
+
+    /// Prepares a ray and searches the tree, compiled for the set.
+    unsafe fn search<Q: Query>(tree: &Tree, ray: &Ray, clip: Option<&Interval>, query: &mut Q);
 
     /// [`leaf::meet_leaf`] compiled for the set, and kept out of the loop over nodes, which needs the registers.
     unsafe fn meet_leaf<Q: Query>(words: *const u32, leaf: Child, ray: &PreparedRay, query: &mut Q) -> bool;

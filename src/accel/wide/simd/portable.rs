@@ -1,11 +1,12 @@
 //! Eight lanes as an array: what every processor can do, and what the other sets are compared with.
 
 use super::packet::{self, Packet};
-use super::single::Query;
+use super::single::{self, Query};
 use super::{Lanes, Rows, leaf};
 use crate::accel::wide::Tree;
 use crate::accel::wide::node::Child;
-use crate::geometry::PreparedRay;
+use crate::geometry::ray::Interval;
+use crate::geometry::{PreparedRay, Ray};
 
 /// The instructions that the crate was compiled for.
 pub struct Portable;
@@ -82,6 +83,12 @@ impl Lanes for Portable {
 
     #[inline(always)]
     unsafe fn prefetch(_: *const u8) {}
+
+    #[inline(never)]
+    unsafe fn search<Q: Query>(tree: &Tree, ray: &Ray, clip: Option<&Interval>, query: &mut Q) {
+        // SAFETY: as the caller promises.
+        unsafe { single::prepare_and_walk::<Self, Q>(tree, ray, clip, query) }
+    }
 
     #[inline(never)]
     unsafe fn meet_leaf<Q: Query>(words: *const u32, leaf: Child, ray: &PreparedRay, query: &mut Q) -> bool {

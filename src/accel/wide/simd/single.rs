@@ -6,6 +6,7 @@ use super::super::collapse::MOST_DEPTH;
 use super::super::node::{Child, NODE_SHIFT, Node, PLANE_BYTES, TRIANGLE_WORDS, WIDTH};
 use super::{Lanes, Level, Portable, Set};
 use crate::accel::wide::Tree;
+use crate::geometry::ray::Interval;
 use crate::geometry::{Hit, Key, PreparedRay, Ray, TriangleHit};
 
 /// What a search looks for. The ends of the interval of t are in the space of the tree.
@@ -164,7 +165,7 @@ pub fn search_alone<Q: Query>(level: Level, tree: &Tree, ray: &Ray, query: &mut 
     // SAFETY: as above.
     unsafe {
         match level.0 {
-            Set::Portable => prepare_and_walk::<Portable, Q>(tree, ray, query),
+            Set::Portable => prepare_and_walk::<Portable, Q>(tree, ray, None, query),
             #[cfg(target_arch = "x86_64")]
             Set::Avx2 => prepare_and_walk_avx2(tree, ray, query),
             #[cfg(target_arch = "x86_64")]
@@ -176,8 +177,8 @@ pub fn search_alone<Q: Query>(level: Level, tree: &Tree, ray: &Ray, query: &mut 
 /// # Safety
 /// As for [`walk`].
 #[inline(always)]
-unsafe fn prepare_and_walk<L: Lanes, Q: Query>(tree: &Tree, ray: &Ray, query: &mut Q) {
-    if let Some(ray) = PreparedRay::new(ray) {
+pub unsafe fn prepare_and_walk<L: Lanes, Q: Query>(tree: &Tree, ray: &Ray, clip: Option<&Interval>, query: &mut Q) {
+    if let Some(ray) = PreparedRay::clipped(ray, clip) {
         // SAFETY: as the caller promises.
         unsafe { walk::<L, Q>(tree, &ray, query) }
     }
@@ -196,7 +197,7 @@ macro_rules! compile {
         #[target_feature(enable = $features)]
         unsafe fn $prepare_and_walk<Q: Query>(tree: &Tree, ray: &Ray, query: &mut Q) {
             // SAFETY: as the caller promises.
-            unsafe { prepare_and_walk::<$lanes, Q>(tree, ray, query) }
+            unsafe { prepare_and_walk::<$lanes, Q>(tree, ray, None, query) }
         }
     };
 }
