@@ -10,7 +10,7 @@ use crate::render::shadow::{Illumination, PreparedLight};
 use crate::render::surface::SurfacePoint;
 use crate::render::trace::{TracedRay, Tracer};
 use crate::scene::camera::ViewRay;
-use crate::scene::{Clamp, Material, Rgb, compiled};
+use crate::scene::{Clamp, Material, Rgb, TextureRef, compiled};
 
 /// A material's terms at a point, textures looked up.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,7 +58,7 @@ impl<I: Answers> Tracer<'_, I> {
             if compiled::REFLECTION && material.is_reflective() {
                 color += material.kr * self.trace(&self.reflected(&here), depth + 1);
             }
-            if compiled::REFRACTION && material.is_transmissive() {
+            if !self.is_opaque() && material.is_transmissive() {
                 color += material.kt * self.trace(&self.transmitted(&here, material), depth + 1);
             }
         }
@@ -93,22 +93,32 @@ impl<I: Answers> Tracer<'_, I> {
         view: &ViewRay,
     ) -> Rgb {
         let material = &self.scene.materials[point.material as usize];
-        visible * illumination.color * direct(material, colors.diffuse, point, view, illumination)
+        let diffuse = if self.is_opaque() { colors.diffuse } else { (Rgb::ONE - material.kt) * colors.diffuse };
+        visible * illumination.color * direct(material, diffuse, point, view, illumination)
+    }
+
+    /// Whether nothing in the scene lets light through.
+    #[inline(always)]
+    pub(super) fn is_opaque(&self) -> bool {
+        self.world.all_opaque || !compiled::REFRACTION
     }
 
     /// The colours of the point that `hit` found.
     pub fn colors(&self, point: &SurfacePoint, hit: &Hit) -> SurfaceColors {
         let material = &self.scene.materials[point.material as usize];
-        let texel = match material.diffuse_texture {
-            Some(reference) if compiled::TEXTURES => {
-                let uv = point.texture_coordinates(self.scene, hit);
-                self.scene.textures[reference.texture as usize].sample(uv * reference.scale + reference.offset)
-            }
-            _ => Rgb::ONE,
+        let diffuse = match &material.diffuse_texture {
+            Some(reference) if compiled::TEXTURES => material.diffuse * self.texel(reference, point, hit),
+            _ => material.diffuse,
         };
-        let diffuse = material.diffuse * texel;
         let ambient = material.ambient.unwrap_or(self.scene.ambient * diffuse);
         SurfaceColors { ambient: ambient + material.emission, diffuse }
+    }
+
+    /// What an image has at a point. Out of line, since scenes without images need not pay.
+    #[inline(never)]
+    fn texel(&self, reference: &TextureRef, point: &SurfacePoint, hit: &Hit) -> Rgb {
+        let uv = point.texture_coordinates(self.scene, hit);
+        self.scene.textures[reference.texture as usize].sample(uv * reference.scale + reference.offset)
     }
 
     /// The mirror ray of a point, counted.
@@ -119,7 +129,8 @@ impl<I: Answers> Tracer<'_, I> {
         TracedRay { ray: self.intersect.ray_outside(from, direction), view }
     }
 
-    /// The ray that goes on through a surface, or is reflected within, counted.
+    /// The ray that goes on through a surface, or is reflected within, counted. Out of line, as [`texel`](Self::texel) is.
+    #[inline(never)]
     pub(super) fn transmitted(&self, from: &Meeting<'_>, material: &Material) -> TracedRay<I::Ray> {
         match refract(from.point, f64::from(material.ior), from.view.direction) {
             Refraction::Through(direction) => {
@@ -132,11 +143,10 @@ impl<I: Answers> Tracer<'_, I> {
     }
 }
 
-/// `(1 - kt) Od (N.L) + ks Os (R.V)^n` for one light.
+/// `D (N.L) + ks Os (R.V)^n` for one light, where D is `(1 - kt) Od`.
 fn direct(material: &Material, diffuse: Rgb, point: &SurfacePoint, view: &ViewRay, illumination: &Illumination) -> Rgb {
     let n_dot_l = illumination.n_dot_l;
-    let through = if compiled::REFRACTION { material.kt } else { Rgb::ZERO };
-    let mut sum = (Rgb::ONE - through) * diffuse * (n_dot_l as f32);
+    let mut sum = diffuse * (n_dot_l as f32);
     if material.ks != Rgb::ZERO {
         let reflected = point.normal * (2.0 * n_dot_l) - illumination.to_light;
         let r_dot_v = -dot(reflected, view.direction);

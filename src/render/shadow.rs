@@ -7,7 +7,7 @@ use crate::math::vector::{dot, normalize};
 use crate::render::answers::{Answers, Meeting};
 use crate::render::surface::SurfacePoint;
 use crate::render::trace::Tracer;
-use crate::scene::{Falloff, Light, LightKind, Rgb, compiled};
+use crate::scene::{Falloff, Light, LightKind, Rgb};
 
 /// The light that would reach a point if nothing stood between.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -136,7 +136,7 @@ impl<I: Answers> Tracer<'_, I> {
     /// The same for a shadow ray that nothing opaque blocks.
     pub(super) fn visible_through(&self, ray: &I::Ray) -> Rgb {
         let mut visible = Rgb::ONE;
-        if self.world.all_opaque || !compiled::REFRACTION {
+        if self.is_opaque() {
             return visible;
         }
         self.intersect.visit_transmissive(ray, |hit| {

@@ -89,7 +89,7 @@ impl<I: Answers> Tracer<'_, I> {
             let here = shading.meeting(&traced.views);
             let material = &self.scene.materials[here.point.material as usize];
             let reflects = deeper && compiled::REFLECTION && material.is_reflective();
-            let transmits = deeper && compiled::REFRACTION && material.is_transmissive();
+            let transmits = deeper && !self.is_opaque() && material.is_transmissive();
             if !reflects && !transmits {
                 colors[shading.ray as usize] = self.clamp(shading.color);
                 continue;
