@@ -181,7 +181,8 @@ impl<T> Group<T> {
 }
 
 impl<A: TriangleAccelerator> TwoLevel<A> {
-    /// The first hit of each ray.
+    /// The first hit of each ray. Out of line, since the deepest recursion must not have what is prepared here on every level.
+    #[inline(never)]
     pub(super) fn closest_all(&self, rays: &[Ray], hits: &mut [Hit]) {
         hits.fill(Hit::MISS);
         if let Top::Single = self.top {
@@ -222,7 +223,8 @@ impl<A: TriangleAccelerator> TwoLevel<A> {
         }
     }
 
-    /// Whether anything that is wanted is hit by each ray.
+    /// Whether anything that is wanted is hit by each ray. Out of line as well.
+    #[inline(never)]
     pub(super) fn occluded_all<F: Filter>(&self, rays: &[Ray], occluded: &mut [bool]) {
         occluded.fill(false);
         if let Top::Single = self.top {

@@ -99,7 +99,7 @@ impl<I: Answers> Tracer<'_, I> {
             let transmitted = transmits.then(|| next.push(self.transmitted(&here, material)));
             pending.push(Pending { ray: shading.ray, material: here.point.material, reflected, transmitted });
         }
-        // The deepest recursion has this batch's colours on every level, but not the rest.
+        // The deepest recursion has this batch's colours and hits on every level, but not the rest.
         drop((traced, shadings));
         if !pending.is_empty() {
             let seen = self.trace_all(next, depth + 1);

@@ -58,6 +58,8 @@ impl World {
             .iter()
             .map(|mesh| !mesh.live_triangles().any(|n| scene.materials[mesh.material(n) as usize].is_transmissive()))
             .collect();
+        // What a quadric without a material of its own has.
+        let default_opaque = scene.materials.first().is_none_or(|material| !material.is_transmissive());
         let prepare = |object: &crate::scene::Object| {
             let (shape_origin, scale, bounds, opaque) = match object.shape {
                 Shape::Mesh(mesh) => {
@@ -65,7 +67,9 @@ impl World {
                     let mesh = &scene.meshes[number];
                     (mesh.origin, mesh.scale(), Some(mesh_bounds[number]), mesh_opaque[number])
                 }
-                Shape::Quadric(quadric) => (DVec3::ZERO, 1.0, scene.quadrics[quadric as usize].bounds(), true),
+                Shape::Quadric(quadric) => {
+                    (DVec3::ZERO, 1.0, scene.quadrics[quadric as usize].bounds(), default_opaque)
+                }
             };
             let transform = Transform::new(relative(&object.transform, shape_origin, scale, scene.origin))
                 .map_err(|error| error.remedy(format!("object `{}`: scales must not be 0", object.name)))?;

@@ -7,9 +7,13 @@ use glam::Vec3;
 use crate::accel::{Kind, Params};
 use crate::error::Result;
 use crate::geometry::{Hit, Ray};
+use crate::math::random::hash2;
 use crate::progress::Progress;
 use crate::render::Renderer;
 use crate::scene::Scene;
+
+/// Rays of a batch: a packet of [`Wide`](crate::accel::Wide) and one that is left over.
+const TOGETHER: usize = 17;
 
 /// A scene built with one kind of structure and preset; displayed as `bvh2 fast`.
 pub struct Structure {
@@ -39,15 +43,16 @@ impl Structure {
 
     /// Asks for the closest hit and for any.
     ///
-    /// A structure that answers batches in another way than single rays is asked both for one ray in eight, which is as many as take no
+    /// A structure that answers batches in another way than single rays is asked both for one ray in sixteen, which is as many as take no
     /// longer than the others; where it disagrees with itself the answer is neither a hit nor a miss.
     pub fn ask(&self, ray: &Ray) -> Answer {
         let answer = Answer { hit: self.renderer.closest(ray), occluded: self.renderer.occluded(ray) };
-        let drawn = (ray.origin.x + ray.direction.y).to_bits().is_multiple_of(8);
-        if self.params.kind.resolve() != Kind::Wide || !drawn {
+        let words: [u32; 8] = bytemuck::cast(*ray);
+        let drawn = words.into_iter().fold(0, hash2);
+        if self.params.kind.resolve() != Kind::Wide || !drawn.is_multiple_of(16) {
             return answer;
         }
-        let together = self.ask_with_neighbors(ray);
+        let together = self.ask_with_neighbors(ray, (drawn / 16) as usize % TOGETHER);
         let agrees = bytemuck::bytes_of(&together.hit) == bytemuck::bytes_of(&answer.hit);
         if agrees && together.occluded == answer.occluded {
             answer
@@ -56,22 +61,19 @@ impl Structure {
         }
     }
 
-    /// What a batch says of a ray among others that go nearly alike.
-    fn ask_with_neighbors(&self, ray: &Ray) -> Answer {
-        let beside = |number: u32| {
-            let [a, b] = [2048.0, 64.0].map(|parts: f32| 1.0 + number as f32 / parts);
-            Ray {
-                origin: ray.origin * Vec3::new(a, 1.0, 2.0 - a),
-                direction: ray.direction * Vec3::new(1.0, b, a),
-                ..*ray
-            }
-        };
-        let rays = [0, 1, 2, 3, 4].map(beside);
-        let mut hits = [Hit::MISS; 5];
-        let mut occluded = [false; 5];
+    /// What a batch says of a ray at a place among others that go nearly alike: a whole packet and one more.
+    fn ask_with_neighbors(&self, ray: &Ray, place: usize) -> Answer {
+        let rays: [Ray; TOGETHER] = std::array::from_fn(|number| {
+            let away = number as f32 - place as f32;
+            let [a, b] = [2048.0, 64.0].map(|parts: f32| 1.0 + away / parts);
+            let (origin, direction) = (Vec3::new(a, 1.0, 2.0 - a), Vec3::new(1.0, b, a));
+            Ray { origin: ray.origin * origin, direction: ray.direction * direction, ..*ray }
+        });
+        let mut hits = [Hit::MISS; TOGETHER];
+        let mut occluded = [false; TOGETHER];
         self.renderer.closest_batch(&rays, &mut hits);
         self.renderer.occluded_batch(&rays, &mut occluded);
-        Answer { hit: hits[0], occluded: occluded[0] }
+        Answer { hit: hits[place], occluded: occluded[place] }
     }
 }
 

@@ -10,10 +10,10 @@ use crate::accel::wide::node::Child;
 use crate::geometry::ray::Interval;
 use crate::geometry::{PreparedRay, Ray};
 
-/// AVX2 and BMI1.
+/// AVX2, BMI1 and POPCNT.
 pub struct Avx2;
 
-/// AVX-512 (F, VL, DQ) in vectors of 256 bits, and BMI1.
+/// AVX-512 (F, VL, DQ), for single rays in vectors of 256 bits, BMI1 and POPCNT.
 pub struct Avx512;
 
 /// The sets differ in how lanes are compared.

@@ -49,7 +49,7 @@ impl Coherence {
     /// A packet whose rays meet boxes with fewer than this many together is slower than they are alone.
     const LEAST_MET: u32 = 6;
 
-    /// Packets that go alone after two that were not worth it.
+    /// Packets whose rays go alone after two in a row that were not worth it.
     const PAUSE: u32 = 30;
 
     fn new() -> Self {
@@ -59,18 +59,20 @@ impl Coherence {
     /// Whether to try a packet.
     #[inline(always)]
     fn tries(&mut self) -> bool {
+        let tries = self.alone == 0;
         self.alone = self.alone.saturating_sub(1);
-        self.alone == 0
+        tries
     }
 
     /// Takes note of a packet.
     #[inline(always)]
     fn saw(&mut self, boxes: u32, met: u32) {
         let fails = met < Self::LEAST_MET * boxes;
-        if fails && self.failed {
+        let pauses = fails && self.failed;
+        if pauses {
             self.alone = Self::PAUSE;
         }
-        self.failed = fails;
+        self.failed = fails && !pauses;
     }
 }
 

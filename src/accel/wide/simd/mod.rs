@@ -55,12 +55,16 @@ impl Level {
         let sets = [
             Some(Set::Portable),
             #[cfg(target_arch = "x86_64")]
-            (is_x86_feature_detected!("avx2") && is_x86_feature_detected!("bmi1")).then_some(Set::Avx2),
+            (is_x86_feature_detected!("avx2")
+                && is_x86_feature_detected!("bmi1")
+                && is_x86_feature_detected!("popcnt"))
+            .then_some(Set::Avx2),
             #[cfg(target_arch = "x86_64")]
             (is_x86_feature_detected!("avx512f")
                 && is_x86_feature_detected!("avx512vl")
                 && is_x86_feature_detected!("avx512dq")
-                && is_x86_feature_detected!("bmi1"))
+                && is_x86_feature_detected!("bmi1")
+                && is_x86_feature_detected!("popcnt"))
             .then_some(Set::Avx512),
         ];
         sets.into_iter().flatten().map(Self)

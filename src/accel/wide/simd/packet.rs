@@ -106,16 +106,18 @@ fn places(at: &[u16]) -> [i32; RAYS] {
 
 /// A lane of a row.
 #[inline(always)]
-pub fn lane<R>(row: &R, lane: usize) -> f32 {
-    debug_assert!(lane < RAYS && size_of::<R>() == RAYS * size_of::<f32>());
+fn lane<L: Rows>(row: &L::Row, lane: usize) -> f32 {
+    const { assert!(size_of::<L::Row>() == RAYS * size_of::<f32>()) };
+    assert!(lane < RAYS);
     // SAFETY: a row is sixteen numbers.
     unsafe { *(&raw const *row).cast::<f32>().add(lane) }
 }
 
 /// Sets a lane of a row.
 #[inline(always)]
-pub fn set_lane<R>(row: &mut R, lane: usize, x: f32) {
-    debug_assert!(lane < RAYS && size_of::<R>() == RAYS * size_of::<f32>());
+fn set_lane<L: Rows>(row: &mut L::Row, lane: usize, x: f32) {
+    const { assert!(size_of::<L::Row>() == RAYS * size_of::<f32>()) };
+    assert!(lane < RAYS);
     // SAFETY: as above.
     unsafe { *(&raw mut *row).cast::<f32>().add(lane) = x }
 }
@@ -165,7 +167,7 @@ impl<'a, L: Rows> Packet<'a, L> {
                 inverse[axis] = L::row_sub(zero, L::row_div(one, direction[axis]));
                 inverse_far[axis] = L::row_farther(inverse[axis], PADDING);
                 let [least, most] = L::row_ends(origin[axis]);
-                let negative = lane(&direction[axis], 0).is_sign_negative();
+                let negative = lane::<L>(&direction[axis], 0).is_sign_negative();
                 let (origin_near, origin_far) = if negative { (least, most) } else { (most, least) };
                 let inverse = L::row_ends(inverse[axis]);
                 extremes[axis] = Extremes { origin_near, origin_far, inverse, inverse_far: inverse.map(padded) };
@@ -255,29 +257,29 @@ impl<'a, L: Rows> Packet<'a, L> {
     #[inline(always)]
     pub fn best(&self, number: usize) -> Hit {
         Hit {
-            t: lane(&self.best_t, number),
-            u: lane(&self.best_u, number),
-            v: lane(&self.best_v, number),
-            instance: lane(&self.best_instance, number).to_bits(),
-            primitive: lane(&self.best_primitive, number).to_bits(),
+            t: lane::<L>(&self.best_t, number),
+            u: lane::<L>(&self.best_u, number),
+            v: lane::<L>(&self.best_v, number),
+            instance: lane::<L>(&self.best_instance, number).to_bits(),
+            primitive: lane::<L>(&self.best_primitive, number).to_bits(),
         }
     }
 
     /// Instance and primitive of what a ray has found.
     #[inline(always)]
     pub fn best_place(&self, number: usize) -> (u32, u32) {
-        (lane(&self.best_instance, number).to_bits(), lane(&self.best_primitive, number).to_bits())
+        (lane::<L>(&self.best_instance, number).to_bits(), lane::<L>(&self.best_primitive, number).to_bits())
     }
 
     /// Takes what a ray has found alone.
     #[inline(always)]
     fn set_best(&mut self, number: usize, best: &Hit) {
         self.unfinished &= !(1 << number);
-        set_lane(&mut self.best_t, number, best.t);
-        set_lane(&mut self.best_u, number, best.u);
-        set_lane(&mut self.best_v, number, best.v);
-        set_lane(&mut self.best_instance, number, f32::from_bits(best.instance));
-        set_lane(&mut self.best_primitive, number, f32::from_bits(best.primitive));
+        set_lane::<L>(&mut self.best_t, number, best.t);
+        set_lane::<L>(&mut self.best_u, number, best.u);
+        set_lane::<L>(&mut self.best_v, number, best.v);
+        set_lane::<L>(&mut self.best_instance, number, f32::from_bits(best.instance));
+        set_lane::<L>(&mut self.best_primitive, number, f32::from_bits(best.primitive));
     }
 
     /// As [`PreparedRay::far_bound`].
