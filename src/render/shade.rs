@@ -82,7 +82,7 @@ impl<I: Answers> Tracer<'_, I> {
         if compiled::MANY_LIGHTS { lights } else { &lights[..1] }
     }
 
-    /// What a light adds that is visible from a point.
+    /// What a light adds of which so much is visible from a point: all, in a scene that lets no light through.
     #[inline(always)]
     pub(super) fn lit(
         &self,
@@ -93,7 +93,10 @@ impl<I: Answers> Tracer<'_, I> {
         view: &ViewRay,
     ) -> Rgb {
         let material = &self.scene.materials[point.material as usize];
-        let diffuse = if self.is_opaque() { colors.diffuse } else { (Rgb::ONE - material.kt) * colors.diffuse };
+        if self.is_opaque() {
+            return illumination.color * direct(material, colors.diffuse, point, view, illumination);
+        }
+        let diffuse = (Rgb::ONE - material.kt) * colors.diffuse;
         visible * illumination.color * direct(material, diffuse, point, view, illumination)
     }
 

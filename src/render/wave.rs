@@ -141,7 +141,7 @@ impl<I: Answers> Tracer<'_, I> {
                     continue;
                 }
                 let visible = self.visible_through(ray);
-                if visible != Rgb::ZERO {
+                if self.is_opaque() || visible != Rgb::ZERO {
                     let shading = &mut shadings[*number as usize];
                     let view = &views[shading.ray as usize];
                     shading.color += self.lit(visible, illumination, &shading.colors, &shading.point, view);
