@@ -9,13 +9,12 @@
 use std::ops::Range;
 
 use glam::{DVec3, Vec3};
-use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::leaf_collapser::collapse;
 use obvhs::bvh2::node::Bvh2Node;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
-use obvhs::ploc::PlocBuilder;
+use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
 use super::Preset;
 use crate::error::Result;
@@ -43,6 +42,32 @@ const SEARCH_DEPTH: usize = 96;
 /// The optimiser's rounds; round `i` tries a part of the nodes that is 1 over `2 i + 1` (obvhs's own choice).
 const OPTIMIZER_ROUNDS: u32 = 16;
 
+/// What a leaf costs beside its items, in items.
+const LEAF_NODES: f32 = 3.0;
+
+/// How much time is spent.
+struct Effort {
+    /// How far along the curve partners are looked for, from the first round on. obvhs's own choices look at the next neighbours
+    /// only in the first two or three rounds, which take longest: then rays on a dragon of 871 k triangles cost 2 to 3 % more.
+    search: PlocSearchDistance,
+    precision: SortPrecision,
+    /// Which part of the nodes is tried elsewhere in the first round.
+    reinsertion: f32,
+    /// The same as a multiple of it, after leaves were collapsed.
+    once_more: f32,
+}
+
+impl Effort {
+    fn of(preset: Preset) -> Self {
+        let (search, precision, reinsertion, once_more) = match preset {
+            Preset::Fast => (PlocSearchDistance::VeryLow, SortPrecision::U64, 0.02, 0.0),
+            Preset::Balanced => (PlocSearchDistance::Low, SortPrecision::U64, 0.05, 2.0),
+            Preset::Best => (PlocSearchDistance::Medium, SortPrecision::U128, 0.2, 2.0),
+        };
+        Self { search, precision, reinsertion, once_more }
+    }
+}
+
 /// Builds nodes over boxes that are not empty, and the boxes' positions in the order of the leaves.
 ///
 /// The boxes in the nodes are approximate. Reports up to 95 % of `share`; how the stages divide it is a guess, and the
@@ -51,29 +76,26 @@ const OPTIMIZER_ROUNDS: u32 = 16;
 /// # Errors
 /// When `share` says to stop.
 pub fn build(boxes: &[Bounds], preset: Preset, max_leaf: u32, share: &mut Share) -> Result<(Vec<Bvh2Node>, Vec<u32>)> {
-    let params = match preset {
-        Preset::Fast => BvhBuildParams::fast_build(),
-        Preset::Balanced => BvhBuildParams::medium_build(),
-        Preset::Best => BvhBuildParams::slow_build(),
-    };
+    let effort = Effort::of(preset);
     let dealt = deal(boxes.len());
     let nudged = nudge(boxes, &dealt);
     share.reach(5)?;
     let mut tree = PlocBuilder::with_capacity(nudged.len()).build(
-        params.ploc_search_distance,
+        effort.search,
         &nudged,
         (0..nudged.len() as u32).collect(),
-        params.sort_precision,
-        params.search_depth_threshold,
+        effort.precision,
+        0,
     );
     drop(nudged);
     share.reach(35)?;
 
-    let ratio = params.reinsertion_batch_ratio;
-    optimize(&mut tree, ratio, 35..60, share)?;
-    collapse(&mut tree, max_leaf, params.collapse_traversal_cost);
-    share.reach(65)?;
-    optimize(&mut tree, ratio * params.post_collapse_reinsertion_batch_ratio_multiplier, 65..95, share)?;
+    optimize(&mut tree, effort.reinsertion, 35..60, share)?;
+    if max_leaf > 1 {
+        collapse(&mut tree, max_leaf, LEAF_NODES);
+        share.reach(65)?;
+        optimize(&mut tree, effort.reinsertion * effort.once_more, 65..95, share)?;
+    }
 
     let order = tree.primitive_indices.iter().map(|&position| dealt[position as usize]).collect();
     Ok((tree.nodes, order))
@@ -81,11 +103,14 @@ pub fn build(boxes: &[Bounds], preset: Preset, max_leaf: u32, share: &mut Share)
 
 /// Moves nodes to better places, `ratio` of them in the first round, and reports `percent` of `share` on the way.
 fn optimize(tree: &mut Bvh2, ratio: f32, percent: Range<u32>, share: &mut Share) -> Result<()> {
+    if ratio <= 0.0 {
+        return Ok(());
+    }
     let mut optimizer = ReinsertionOptimizer::default();
     for round in 0..OPTIMIZER_ROUNDS {
         // Nested boxes were seen to become 5 times as deep in the first round, which is the largest: look at the depth
         // often while rounds are large.
-        if (round == 0 || round.is_power_of_two()) && depth(&tree.nodes) > OPTIMIZED_DEPTH {
+        if round < 2 && depth(tree) > OPTIMIZED_DEPTH {
             break;
         }
         optimize_round(&mut optimizer, tree, ratio, round);
@@ -126,7 +151,16 @@ fn nudge(boxes: &[Bounds], order: &[u32]) -> Vec<Aabb> {
 }
 
 /// Inner nodes on the longest way down.
-fn depth(nodes: &[Bvh2Node]) -> usize {
+fn depth(tree: &Bvh2) -> usize {
+    let nodes = &tree.nodes;
+    if tree.children_are_ordered_after_parents {
+        let mut depths = vec![0; nodes.len()];
+        for (number, node) in nodes.iter().enumerate().filter(|(_, node)| !node.is_leaf()) {
+            let below = depths[number] + 1;
+            depths[node.first_index as usize..][..2].fill(below);
+        }
+        return depths.into_iter().max().unwrap_or(0);
+    }
     let mut deepest = 0;
     let mut pending = vec![(0usize, 0usize)];
     while let Some((number, depth)) = pending.pop() {
@@ -181,7 +215,7 @@ mod tests {
     fn the_optimizer_survives_trees_far_deeper_than_it_is_told() {
         const LEAVES: usize = 3000;
         let mut tree = chain(LEAVES);
-        assert_eq!(depth(&tree.nodes), LEAVES - 1);
+        assert_eq!(depth(&tree), LEAVES - 1);
         let mut optimizer = ReinsertionOptimizer::default();
         for round in 0..4 {
             optimize_round(&mut optimizer, &mut tree, 1.0, round);

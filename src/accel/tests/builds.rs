@@ -89,7 +89,8 @@ fn builds_report_every_triangle_once_and_stop_wherever_they_look() {
                 assert_eq!(whole.steps.into_inner(), ball.live_count() as u64, "{} {preset:?}", A::NAME);
                 let (looks, reports) = (whole.looks.into_inner(), whole.reports.into_inner());
                 if kind != Kind::Linear {
-                    assert!(looks > 30 && reports > 10, "{} {preset:?}: {looks} looks, {reports} reports", A::NAME);
+                    // At least once a round of the optimiser, which has 16.
+                    assert!(looks > 16 && reports > 10, "{} {preset:?}: {looks} looks, {reports} reports", A::NAME);
                 }
                 for stop in 1..=looks {
                     let stopped = Counted::new(stop);

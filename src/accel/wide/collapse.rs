@@ -19,7 +19,7 @@ const LEAF_COST: f32 = 0.8;
 const TRIANGLE_COST: f32 = 0.02;
 
 /// At this depth subtrees begin to be cut evenly.
-const EVEN_DEPTH: usize = 36;
+pub const EVEN_DEPTH: usize = 36;
 
 /// The deepest node: [`EVEN_DEPTH`] and what an even tree over 2^28 triangles takes.
 pub const MOST_DEPTH: usize = EVEN_DEPTH + 10;
@@ -69,13 +69,13 @@ impl<'a> Collapse<'a> {
         Self { source, triangles, costs, ranges, nodes: Vec::new(), leaves }
     }
 
-    /// Makes the nodes and leaves, depth first, and returns the root.
-    pub fn run(&mut self) -> Child {
+    /// Makes the nodes and leaves, depth first, and returns the root, which is at `depth` of what it will be part of.
+    pub fn run(&mut self, depth: usize) -> Child {
         if self.source.is_empty() {
             return Child::NONE;
         }
         let mut pending = Vec::new();
-        let child = self.child(0, 0, &mut pending);
+        let child = self.child(0, depth, &mut pending);
         while let Some((at, part, depth)) = pending.pop() {
             let parts = self.split(&part, depth);
             let opened = pending.len();
@@ -89,7 +89,6 @@ impl<'a> Collapse<'a> {
             }
             pending[opened..].reverse();
         }
-        self.leaves.finish();
         child
     }
 

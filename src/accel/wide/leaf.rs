@@ -7,6 +7,7 @@
 use glam::Vec3;
 
 use super::node::{TRIANGLE_WORDS, WIDTH};
+use super::simd::prefer_huge_pages;
 use crate::accel::leaf::LeafTriangle;
 
 /// All leaves' triangles.
@@ -22,6 +23,7 @@ impl Leaves {
     pub fn with_capacity(triangles: usize) -> Self {
         let mut words = Vec::new();
         words.reserve_exact(triangles * TRIANGLE_WORDS + WIDTH);
+        prefer_huge_pages(&mut words);
         Self { words, triangles: 0 }
     }
 
@@ -36,6 +38,12 @@ impl Leaves {
         self.words.extend(leaf.iter().map(|triangle| triangle.primitive));
         self.triangles += leaf.len();
         first
+    }
+
+    /// Adds the leaves of another, which are not ended yet.
+    pub fn append(&mut self, other: &Self) {
+        self.words.extend_from_slice(&other.words);
+        self.triangles += other.triangles;
     }
 
     /// Ends the last leaf with what vectors loaded from it may hold beyond its end.

@@ -2,9 +2,11 @@
 //! time.
 //!
 //! ```text
-//! Topology (ploc) -> Collapse -> Node, Leaves -> Tree -> simd::{single, packet, batch}
+//! Chunks -> Topology (ploc) -> Collapse -> Node, Leaves -> Tree -> simd::{single, packet, batch}
 //! ```
 
+mod build;
+mod chunks;
 mod collapse;
 mod leaf;
 mod node;
@@ -12,21 +14,20 @@ pub mod simd;
 #[cfg(test)]
 mod tests;
 
-use collapse::{Collapse, MOST_DEPTH};
+use collapse::MOST_DEPTH;
 use leaf::Leaves;
 use node::{Child, Node};
 use simd::{Closest, Level, NextAfter, Occluded};
 
-use super::leaf::{LeafTriangle, check_distinct, check_partition};
-use super::topology::{Topology, half_area};
+use super::leaf::{check_distinct, check_partition};
+use super::topology::half_area;
 use super::{Params, TreeStats, TriangleAccelerator};
 use crate::error::{Error, Result};
 use crate::geometry::ray::Interval;
-use crate::geometry::triangle::hit_bounds;
 use crate::geometry::{Bounds, Hit, Key, PreparedRay, Ray, TriangleMesh};
-use crate::progress::{Progress, Share};
+use crate::progress::Progress;
 
-/// Nodes and leaves. Only ever made by [`Collapse`], or by tests that checked them, so that children are in range.
+/// Nodes and leaves. Only ever made by [`build`], or by tests that checked them, so that children are in range.
 #[derive(Debug)]
 pub struct Tree {
     nodes: Vec<Node>,
@@ -73,23 +74,12 @@ impl TriangleAccelerator for Wide {
     const NAME: &'static str = "wide";
 
     fn build(mesh: &TriangleMesh, params: &Params, progress: &dyn Progress) -> Result<Self> {
-        progress.check()?;
         if mesh.live_count() >= Child::MOST {
             let message =
                 format!("mesh `{}` has {} triangles; a wide tree holds {}", mesh.name, mesh.live_count(), Child::MOST);
             return Err(Error::limit(message));
         }
-        let mut share = Share::new(progress, mesh.live_count() as u64);
-        let live: Vec<u32> = mesh.live_triangles().collect();
-        let boxes: Vec<Bounds> = live.iter().map(|&number| hit_bounds(mesh.triangle(number))).collect();
-        let topology = Topology::build(&boxes, params.preset, 1, &mut share)?;
-        drop(boxes);
-        let triangles: Vec<_> = topology.order.iter().map(|&at| LeafTriangle::new(mesh, live[at as usize])).collect();
-        let mut collapse = Collapse::new(&topology, &triangles);
-        let root = collapse.run();
-        let bounds = topology.nodes.first().map_or(Bounds::EMPTY, |root| root.bounds);
-        let tree = Tree::new(collapse.nodes, collapse.leaves, root);
-        share.reach(100)?;
+        let (tree, bounds) = build::build(mesh, params.preset, progress)?;
         let wide = Self { tree, bounds, level: Level::chosen() };
         debug_assert_eq!(wide.validate(), Ok(()), "{}", Self::NAME);
         Ok(wide)

@@ -50,6 +50,15 @@ impl Child {
         self.0 as usize
     }
 
+    /// The same child where so many nodes and triangles come before those that it was numbered among.
+    pub fn moved(self, nodes: usize, triangles: usize) -> Self {
+        match self {
+            Self::NONE => self,
+            leaf if leaf.is_leaf() => Self::leaf(leaf.first() + triangles, leaf.count()),
+            inner => Self::inner(inner.number() + nodes),
+        }
+    }
+
     /// A leaf's first place.
     #[inline(always)]
     pub fn first(self) -> usize {

@@ -2,10 +2,14 @@
 
 use glam::Vec3;
 
+use super::collapse::Collapse;
 use super::simd::Level;
 use super::*;
-use crate::accel::{Kind, Linear};
+use crate::accel::leaf::LeafTriangle;
+use crate::accel::topology::Topology;
+use crate::accel::{Bvh2, Kind, Linear};
 use crate::geometry::Ray;
+use crate::geometry::triangle::hit_bounds;
 use crate::math::random::Random;
 use crate::progress::Silent;
 
@@ -186,11 +190,61 @@ fn deep_ends_are_cut_evenly() {
     let topology = Topology { nodes, order: (0..count as u32).collect() };
     let triangles: Vec<_> = live.iter().map(|&number| LeafTriangle::new(&mesh, number)).collect();
     let mut collapse = Collapse::new(&topology, &triangles);
-    let root = collapse.run();
+    let root = collapse.run(0);
+    collapse.leaves.finish();
     let tree = Tree::new(collapse.nodes, collapse.leaves, root);
     let wide = Wide { tree, bounds: topology.nodes[0].bounds, level: Level::chosen() };
     assert_eq!(wide.validate(), Ok(()));
     assert!(wide.stats().max_depth > 30 && wide.stats().max_depth as usize <= MOST_DEPTH);
+}
+
+#[test]
+fn trees_of_many_chunks_are_sound_and_the_same_on_any_number_of_threads() {
+    let mut random = Random::new(17, 0x51d);
+    let mesh = confetti(6 * chunks::MOST, 0.02, &mut random);
+    let build = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| Wide::build(&mesh, &Params::default(), &Silent)).unwrap()
+    };
+    let wide = build(3);
+    assert_eq!(wide.validate(), Ok(()));
+    let alone = build(1);
+    assert_eq!(wide.tree.leaves.words(), alone.tree.leaves.words());
+    assert!(wide.tree.nodes.iter().zip(&alone.tree.nodes).all(|(one, other)| one.planes == other.planes));
+    assert!(wide.tree.nodes.iter().zip(&alone.tree.nodes).all(|(one, other)| one.children == other.children));
+    let other = Bvh2::build(&mesh, &Params::default(), &Silent).unwrap();
+    for ray in rays(2000, &mut random) {
+        assert_eq!(wide.closest_alone(&ray), other.closest_alone(&ray), "{ray:?}");
+    }
+}
+
+#[test]
+fn a_build_of_many_chunks_can_be_stopped() {
+    use std::sync::atomic::{AtomicU64, Ordering};
+    /// Says to stop once some triangles are done.
+    struct Stopping(AtomicU64);
+    impl Progress for Stopping {
+        fn advance(&self, steps: u64) {
+            self.0.fetch_add(steps, Ordering::Relaxed);
+        }
+        fn is_cancelled(&self) -> bool {
+            self.0.load(Ordering::Relaxed) > 30_000
+        }
+    }
+    let mesh = confetti(6 * chunks::MOST, 0.02, &mut Random::new(18, 0x51d));
+    let progress = Stopping(AtomicU64::new(0));
+    assert!(Wide::build(&mesh, &Params::default(), &progress).is_err());
+    assert!(progress.0.into_inner() < 60_000);
+    let counting = Counting(AtomicU64::new(0));
+    Wide::build(&mesh, &Params::default(), &counting).unwrap();
+    assert_eq!(counting.0.into_inner(), mesh.live_count() as u64);
+    /// Counts steps.
+    struct Counting(AtomicU64);
+    impl Progress for Counting {
+        fn advance(&self, steps: u64) {
+            self.0.fetch_add(steps, Ordering::Relaxed);
+        }
+    }
 }
 
 #[test]

@@ -10,12 +10,14 @@
 mod avx;
 mod batch;
 mod leaf;
+mod memory;
 mod packet;
 mod packet_leaf;
 mod portable;
 mod single;
 
 pub use batch::{closest_batch, occluded_batch};
+pub use memory::prefer_huge_pages;
 pub use single::{Closest, NextAfter, Occluded, search, search_alone};
 
 use std::sync::OnceLock;
