@@ -8,14 +8,14 @@ use crate::geometry::Hit;
 use crate::progress::Progress;
 use crate::render::answers::Answers;
 use crate::render::film::{Aov, AovKind, Film};
-use crate::render::sampling::Pattern;
+use crate::render::sampling::{Positions, position};
 use crate::render::settings::{Crop, RayCounts, RenderSettings, RenderStats};
 use crate::render::surface::SurfacePoint;
 use crate::render::trace::Tracer;
 use crate::render::wave::LARGEST;
 use crate::render::world::World;
 use crate::scene::camera::{CameraRays, ViewRay};
-use crate::scene::{Background, Scene};
+use crate::scene::{Background, Rgb, Scene};
 
 /// Side of a tile in pixels: 32 x 32 pixels keep a thread busy for long enough and share well.
 const TILE: u32 = 32;
@@ -163,7 +163,8 @@ fn tile_pixels<I: Answers>(
                 tile.alpha[at] = pixel.alpha;
             }
             if !aovs.is_empty() {
-                record(tracer, pixel.view.as_ref(), &pixel.hit, aovs, &mut tile.aovs, at);
+                let first = DVec2::new(f64::from(x), f64::from(y)) + position(x, y, 0, samples);
+                record(tracer, camera.ray(first).as_ref(), &pixel.hit, aovs, &mut tile.aovs, at);
             }
         });
     }
@@ -191,9 +192,7 @@ struct Pixel {
     color: [f32; 3],
     /// The part of them that hit something.
     alpha: f32,
-    /// The first sample's ray.
-    view: Option<ViewRay>,
-    /// What that hit.
+    /// What the first sample hit.
     hit: Hit,
 }
 
@@ -202,41 +201,100 @@ fn pixels_together<I: Answers>(
     tracer: &Tracer<'_, I>,
     camera: &CameraRays,
     pixels: &[(u32, u32)],
-    mut finished: impl FnMut(u32, u32, Pixel),
+    finished: impl FnMut(u32, u32, Pixel),
 ) {
-    let samples = tracer.scene.film.samples;
-    let mut rays = pixels.iter().flat_map(|&(x, y)| {
-        let (corner, pattern) = (DVec2::new(f64::from(x), f64::from(y)), Pattern::new(x, y, samples));
-        (0..samples).map(move |sample| camera.ray(corner + pattern.position(sample)))
-    });
-    let mut pixels = pixels.iter();
-    // The pixel at hand: the sums of its samples, in f64 in their order.
-    let (mut sum, mut covered, mut sample) = ([0.0f64; 3], 0u32, 0u32);
-    let mut first = (None, Hit::MISS);
-    loop {
-        let views: Vec<Option<ViewRay>> = rays.by_ref().take(LARGEST).collect();
-        if views.is_empty() {
-            return;
+    let mut positions = Positions::new(tracer.scene.film.samples);
+    let mut samples = Samples {
+        views: Vec::with_capacity(LARGEST),
+        blind: Vec::new(),
+        pixels: pixels.iter(),
+        pixel: Sums::default(),
+        samples: tracer.scene.film.samples,
+        finished,
+    };
+    for &(x, y) in pixels {
+        let corner = DVec2::new(f64::from(x), f64::from(y));
+        for &position in positions.of(x, y) {
+            samples.push(camera.ray(corner + position));
+            if samples.count() == LARGEST {
+                samples.trace(tracer);
+            }
         }
-        let (colors, hits) = tracer.trace_cameras(views.iter().flatten().copied().collect());
-        let mut seen = colors.into_iter().zip(hits);
-        for view in views {
-            let (color, hit) = view.and_then(|_| seen.next()).unwrap_or((crate::scene::Rgb::ZERO, Hit::MISS));
-            for (sum, value) in sum.iter_mut().zip(color.to_array()) {
-                *sum += f64::from(value);
+    }
+    samples.trace(tracer);
+}
+
+/// Samples that are traced together, and the pixels that they belong to.
+struct Samples<'a, F> {
+    views: Vec<ViewRay>,
+    /// The positions among the samples of those that have no ray.
+    blind: Vec<usize>,
+    /// The pixels that are not finished.
+    pixels: std::slice::Iter<'a, (u32, u32)>,
+    /// The first of them.
+    pixel: Sums,
+    /// How many a pixel has.
+    samples: u32,
+    finished: F,
+}
+
+/// What is known of a pixel's samples so far.
+#[derive(Default)]
+struct Sums {
+    /// In f64, summed in their order.
+    color: [f64; 3],
+    covered: u32,
+    count: u32,
+    first: Option<Hit>,
+}
+
+impl<F: FnMut(u32, u32, Pixel)> Samples<'_, F> {
+    fn count(&self) -> usize {
+        self.views.len() + self.blind.len()
+    }
+
+    #[inline(always)]
+    fn push(&mut self, view: Option<ViewRay>) {
+        match view {
+            Some(view) => self.views.push(view),
+            None => self.blind.push(self.count()),
+        }
+    }
+
+    /// Traces what there is.
+    fn trace<I: Answers>(&mut self, tracer: &Tracer<'_, I>) {
+        let (colors, hits) = tracer.trace_cameras(std::mem::replace(&mut self.views, Vec::with_capacity(LARGEST)));
+        let blind = std::mem::take(&mut self.blind);
+        let mut blind = blind.into_iter().peekable();
+        let mut position = 0;
+        for (color, hit) in colors.into_iter().zip(hits) {
+            while blind.next_if_eq(&position).is_some() {
+                self.add(Rgb::ZERO, Hit::MISS);
+                position += 1;
             }
-            covered += u32::from(hit.is_hit());
-            if sample == 0 {
-                first = (view, hit);
-            }
-            sample += 1;
-            if sample == samples {
-                let &(x, y) = pixels.next().expect("each pixel has as many samples");
-                let color = sum.map(|sum| (sum / f64::from(samples)) as f32);
-                let alpha = (f64::from(covered) / f64::from(samples)) as f32;
-                finished(x, y, Pixel { color, alpha, view: first.0, hit: first.1 });
-                (sum, covered, sample) = ([0.0; 3], 0, 0);
-            }
+            self.add(color, hit);
+            position += 1;
+        }
+        blind.for_each(|_| self.add(Rgb::ZERO, Hit::MISS));
+    }
+
+    /// Adds what the next sample saw to its pixel.
+    #[inline(always)]
+    fn add(&mut self, color: Rgb, hit: Hit) {
+        let pixel = &mut self.pixel;
+        for (sum, value) in pixel.color.iter_mut().zip(color.to_array()) {
+            *sum += f64::from(value);
+        }
+        pixel.covered += u32::from(hit.is_hit());
+        pixel.first.get_or_insert(hit);
+        pixel.count += 1;
+        if pixel.count == self.samples {
+            let pixel = std::mem::take(&mut self.pixel);
+            let &(x, y) = self.pixels.next().expect("each pixel has as many samples");
+            let samples = f64::from(self.samples);
+            let color = pixel.color.map(|sum| (sum / samples) as f32);
+            let alpha = (f64::from(pixel.covered) / samples) as f32;
+            (self.finished)(x, y, Pixel { color, alpha, hit: pixel.first.unwrap_or(Hit::MISS) });
         }
     }
 }

@@ -4,18 +4,18 @@ use glam::DVec2;
 
 use crate::math::random::{hash2, unit};
 
-/// The position of a sample within its pixel, both coordinates in [0, 1); [`Pattern::position`] of that pixel.
-pub fn position(x: u32, y: u32, sample: u32, samples: u32) -> DVec2 {
-    Pattern::new(x, y, samples).position(sample)
-}
-
-/// Where the samples of one pixel lie.
+/// The position of a sample within its pixel, both coordinates in [0, 1).
 ///
 /// One sample lies at the centre. More are correlated multi-jittered (Kensler, "Correlated Multi-Jittered Sampling",
 /// Pixar 2013): stratified on a grid and on both axes, for any number. The pattern is keyed by the pixel's position
 /// in the full picture, so crops and tiles do not change it.
+pub fn position(x: u32, y: u32, sample: u32, samples: u32) -> DVec2 {
+    if samples == 1 { DVec2::splat(0.5) } else { Pattern::new(x, y, samples).position(sample) }
+}
+
+/// Where the samples of one pixel lie, more than one.
 #[derive(Debug, Clone, Copy)]
-pub struct Pattern {
+struct Pattern {
     key: u32,
     samples: u32,
     columns: u32,
@@ -26,8 +26,7 @@ pub struct Pattern {
 }
 
 impl Pattern {
-    /// The pattern of a pixel.
-    pub fn new(x: u32, y: u32, samples: u32) -> Self {
+    fn new(x: u32, y: u32, samples: u32) -> Self {
         let key = hash2(x, y);
         let columns = (f64::from(samples).sqrt() as u32).max(1);
         let rows = samples.div_ceil(columns);
@@ -43,17 +42,51 @@ impl Pattern {
     }
 
     /// The position of a sample within the pixel, both coordinates in [0, 1).
-    pub fn position(&self, sample: u32) -> DVec2 {
-        if self.samples == 1 {
-            return DVec2::splat(0.5);
-        }
+    fn position(&self, sample: u32) -> DVec2 {
         let shuffled = self.order.at(sample);
-        let column = self.column.at(shuffled % self.columns);
-        let row = self.row.at(shuffled / self.columns);
+        self.within(shuffled, self.column.at(shuffled % self.columns), self.row.at(shuffled / self.columns))
+    }
+
+    /// The position of the sample that is so many in the shuffled order and lies in a column and, along x, in a row of it.
+    #[inline(always)]
+    fn within(&self, shuffled: u32, column: u32, row: u32) -> DVec2 {
         let jitter = |salt: u32| unit(hash2(shuffled, self.key ^ salt));
         let within = |index: f64, count: u32| (index / f64::from(count)).min(1.0f64.next_down());
         let across = f64::from(column) + (f64::from(row) + jitter(0xa399_d265)) / f64::from(self.rows);
         DVec2::new(within(across, self.columns), within(f64::from(shuffled) + jitter(0x711a_d6a5), self.samples))
+    }
+}
+
+/// The positions of all samples of one pixel after another, with what can be shared between them.
+#[derive(Debug)]
+pub struct Positions {
+    samples: u32,
+    at: Vec<DVec2>,
+    columns: Vec<u32>,
+    rows: Vec<u32>,
+}
+
+impl Positions {
+    /// For so many samples a pixel.
+    pub fn new(samples: u32) -> Self {
+        Self { samples, at: vec![DVec2::splat(0.5); samples as usize], columns: Vec::new(), rows: Vec::new() }
+    }
+
+    /// [`position`] for each of a pixel's samples.
+    pub fn of(&mut self, x: u32, y: u32) -> &[DVec2] {
+        if self.samples > 1 {
+            let pattern = Pattern::new(x, y, self.samples);
+            self.columns.clear();
+            self.columns.extend((0..pattern.columns).map(|column| pattern.column.at(column)));
+            self.rows.clear();
+            self.rows.extend((0..pattern.rows).map(|row| pattern.row.at(row)));
+            for (sample, at) in self.at.iter_mut().enumerate() {
+                let shuffled = pattern.order.at(sample as u32);
+                let (row, column) = (shuffled / pattern.columns, shuffled % pattern.columns);
+                *at = pattern.within(shuffled, self.columns[column as usize], self.rows[row as usize]);
+            }
+        }
+        &self.at
     }
 }
 
@@ -123,6 +156,17 @@ mod tests {
             }
             assert!(rows.iter().all(|&n| n == 1), "{samples}: one sample a row");
             assert!(cells.iter().all(|&n| n == 1), "{samples}: one sample a cell: {cells:?}");
+        }
+    }
+
+    #[test]
+    fn all_samples_of_a_pixel_lie_where_each_does() {
+        for samples in [1, 2, 3, 16, 17, 100] {
+            let mut positions = Positions::new(samples);
+            for (x, y) in [(0, 0), (7, 11), (1023, 5)] {
+                let expected: Vec<_> = (0..samples).map(|sample| position(x, y, sample, samples)).collect();
+                assert_eq!(positions.of(x, y), expected);
+            }
         }
     }
 

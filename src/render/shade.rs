@@ -107,6 +107,7 @@ impl<I: Answers> Tracer<'_, I> {
     }
 
     /// The colours of the point that `hit` found.
+    #[inline(always)]
     pub fn colors(&self, point: &SurfacePoint, hit: &Hit) -> SurfaceColors {
         let material = &self.scene.materials[point.material as usize];
         let diffuse = match &material.diffuse_texture {
@@ -147,6 +148,7 @@ impl<I: Answers> Tracer<'_, I> {
 }
 
 /// `D (N.L) + ks Os (R.V)^n` for one light, where D is `(1 - kt) Od`.
+#[inline(always)]
 fn direct(material: &Material, diffuse: Rgb, point: &SurfacePoint, view: &ViewRay, illumination: &Illumination) -> Rgb {
     let n_dot_l = illumination.n_dot_l;
     let mut sum = diffuse * (n_dot_l as f32);
@@ -160,8 +162,9 @@ fn direct(material: &Material, diffuse: Rgb, point: &SurfacePoint, view: &ViewRa
     sum
 }
 
-/// `x^n` for x in (0, 1]; whole exponents by repeated squaring, others by `libm`. At most 1: R.V of unit vectors may
+/// Out of line, since most materials have none: `x^n` for x in (0, 1]; whole exponents by repeated squaring, others by `libm`. At most 1: R.V of unit vectors may
 /// exceed 1 by rounding.
+#[inline(never)]
 fn highlight(x: f64, n: f32) -> f64 {
     let x = x.min(1.0);
     if (0.0..=65536.0).contains(&n) && n.fract() == 0.0 {

@@ -47,7 +47,10 @@ impl<I: Answers> Tracer<'_, I> {
     /// [`trace_camera`](Self::trace_camera) for each ray: what it sees and what it hit.
     pub fn trace_cameras(&self, views: Vec<ViewRay>) -> (Vec<Rgb>, Vec<Hit>) {
         self.count(|counts| counts.camera += views.len() as u64);
-        let rays = views.iter().map(|view| self.intersect.camera_ray(view)).collect();
+        let mut rays = Vec::with_capacity(views.len());
+        for view in &views {
+            rays.push(self.intersect.camera_ray(view));
+        }
         self.trace_wave(Rays { rays, views }, 0)
     }
 
