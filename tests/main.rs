@@ -10,6 +10,7 @@ mod diff;
 mod far_from_origin;
 mod golden;
 mod hard_cases;
+mod memory;
 mod metamorphic;
 mod models;
 mod query;

@@ -16,7 +16,7 @@ use crate::error::{Error, Result};
 use crate::formats::atomic_file::{check_writable, write_atomically};
 use crate::formats::{self, Loaded};
 use crate::measure::bench::rays::{RayKind, SEED, View};
-use crate::measure::bench::{Bench, Calls, HitsOut, Model, Options};
+use crate::measure::bench::{Bench, Calls, HitsOut, Model, Options, ReferenceKind};
 use crate::measure::environment::Environment;
 use crate::measure::generated::Generated;
 #[cfg(feature = "embree")]
@@ -78,6 +78,10 @@ pub struct BenchArguments {
     /// seconds, at most 10000.
     #[arg(long, value_name = "N", value_parser = values::count(1..=MOST_RAYS))]
     pub linear_rays: Option<u32>,
+    /// What all hits are compared with: the binary tree, or a slower one with larger boxes that culls nothing.
+    #[arg(long, value_name = "REFERENCE", default_value = "bvh2",
+        value_parser = one_of(ReferenceKind::ALL.map(|kind| (kind.name(), kind))))]
+    pub reference: ReferenceKind,
     /// Print one JSON document instead of tables.
     #[arg(long)]
     pub json: bool,
@@ -238,6 +242,7 @@ fn options(arguments: &BenchArguments) -> Result<Options> {
         calls: arguments.calls.clone(),
         threads,
         rounds: arguments.rounds,
+        reference: arguments.reference,
         #[cfg(feature = "embree")]
         embree: library.map(|path| Library::load(&path)).transpose()?,
     })

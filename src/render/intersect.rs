@@ -3,6 +3,8 @@
 
 use std::ops::ControlFlow;
 
+use rayon::prelude::*;
+
 use crate::accel::{BoxTree, Kind, Params, TreeStats, TriangleAccelerator};
 use crate::error::Result;
 use crate::geometry::ray::Interval;
@@ -120,7 +122,9 @@ impl<A: TriangleAccelerator> TwoLevel<A> {
     pub fn build(scene: &Scene, params: &Params, progress: &dyn Progress) -> Result<Self> {
         let world = World::new(scene)?;
         let instances = &world.instances;
-        let meshes = scene.meshes.iter().map(|mesh| A::build(mesh, params, progress)).collect::<Result<Vec<_>>>()?;
+        // Small meshes side by side; what is large is built on all threads itself.
+        let build = |mesh| A::build(mesh, params, progress);
+        let meshes = scene.meshes.par_iter().map(build).collect::<Result<Vec<_>>>()?;
         let single = matches!(instances.as_slice(), [one] if one.identity && one.shape == Shape::Mesh(0));
         let top = if single {
             Top::Single
@@ -355,5 +359,49 @@ impl<A: TriangleAccelerator> Intersect for TwoLevel<A> {
 
     fn next_transmissive_after(&self, ray: &Ray, key: Key) -> Hit {
         PreparedRay::new(ray).map_or(Hit::MISS, |ray| self.search::<Transmissive>(&ray, Some(key)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::Wide;
+    use crate::geometry::TriangleMesh;
+    use crate::math::random::Random;
+    use crate::progress::Silent;
+    use crate::scene::{Material, Object};
+
+    #[test]
+    fn many_large_and_small_meshes_are_built_on_any_number_of_threads() {
+        let mut random = Random::new(2, 0x51d);
+        let mut confetti = |count: usize| {
+            let positions: Vec<_> = (0..count)
+                .flat_map(|_| {
+                    let center = random.in_cube();
+                    [(); 3].map(|()| (center + random.in_cube() * 0.01).as_vec3())
+                })
+                .collect();
+            let indices = (0..count as u32).map(|n| [3 * n, 3 * n + 1, 3 * n + 2]).collect();
+            TriangleMesh { positions, indices, ..TriangleMesh::default() }.finish().unwrap()
+        };
+        let meshes: Vec<_> = [50_000, 10, 40_000, 1, 40_000, 300, 60_000].into_iter().map(&mut confetti).collect();
+        let object = |mesh: u32| Object {
+            name: String::new(),
+            shape: Shape::Mesh(mesh),
+            transform: glam::DAffine3::IDENTITY,
+            material: Some(0),
+        };
+        let objects = (0..meshes.len() as u32).map(object).collect();
+        let scene = Scene { meshes, objects, materials: vec![Material::default()], ..Scene::default() };
+        let ray = Ray::new(glam::Vec3::new(0.01, 0.02, 5.0), glam::Vec3::NEG_Z);
+        let mut found = Vec::new();
+        for threads in [1, 2, 5] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let build = || TwoLevel::<Wide>::build(&scene, &Params::default(), &Silent).unwrap();
+            let built = pool.install(build);
+            assert_eq!(built.validate(), Ok(()));
+            found.push(Intersect::closest(&built, &ray));
+        }
+        assert!(found[0].is_hit() && found.iter().all(|hit| *hit == found[0]), "{found:?}");
     }
 }

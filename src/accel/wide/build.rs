@@ -28,15 +28,18 @@ pub fn build(mesh: &TriangleMesh, preset: Preset, progress: &dyn Progress) -> Re
     progress.check()?;
     let assembly = Mutex::new(Assembly::new(top, mesh.live_count()));
     let next = AtomicUsize::new(0);
-    let outcomes: Vec<Result<()>> = rayon::broadcast(|_| {
+    let work = || -> Result<()> {
         loop {
             let number = next.fetch_add(1, Ordering::Relaxed);
             let Some(chunk) = chunks.get(number) else { return Ok(()) };
             let built = Built::new(mesh, chunk, preset, progress)?;
             assembly.lock().expect("no thread panics with it").accept(&chunks, number, built);
         }
-    });
-    outcomes.into_iter().collect::<Result<()>>()?;
+    };
+    match chunks.len() {
+        0 | 1 => work()?,
+        _ => rayon::broadcast(|_| work()).into_iter().collect::<Result<()>>()?,
+    }
     let assembly = assembly.into_inner().expect("no thread panics with it");
     Ok((assembly.finish(), bounds))
 }

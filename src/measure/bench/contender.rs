@@ -4,7 +4,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use crate::accel::{Kind, Params, Preset};
+use crate::accel::{Kind, Params, Preset, TriangleAccelerator};
 use crate::error::{Error, Result};
 use crate::geometry::{Hit, Ray};
 #[cfg(feature = "embree")]
@@ -14,6 +14,7 @@ use crate::measure::peers::{Built, Peer, Surface};
 use crate::measure::statistics::median;
 use crate::progress::Progress;
 use crate::render::Renderer;
+use crate::render::intersect::{Intersect, TwoLevel};
 use crate::scene::Scene;
 
 /// How rays are handed over.
@@ -86,6 +87,17 @@ impl Contender for Renderer {
             Calls::Single => rays.iter().zip(flags).for_each(|(ray, flag)| *flag = occluded(self, ray)),
             Calls::Batch => self.occluded_batch(rays, flags),
         }
+    }
+}
+
+/// The reference, which has no calls of its own for batches.
+impl<A: TriangleAccelerator> Contender for TwoLevel<A> {
+    fn closest(&self, _: Calls, rays: &[Ray], hits: &mut [Hit]) {
+        rays.iter().zip(hits).for_each(|(ray, hit)| *hit = Intersect::closest(self, ray));
+    }
+
+    fn occluded(&self, _: Calls, rays: &[Ray], flags: &mut [bool]) {
+        rays.iter().zip(flags).for_each(|(ray, flag)| *flag = Intersect::occluded(self, ray));
     }
 }
 

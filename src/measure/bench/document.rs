@@ -12,11 +12,11 @@ impl Bench {
         let mut text = self.heading();
         for model in &self.models {
             let rows: Vec<&Row> = self.rows.iter().filter(|row| row.model == model.model).collect();
-            let ModelReport { model: name, triangles, linear_rays } = model;
+            let ModelReport { model: name, triangles, reference, linear_rays } = model;
             let _ = writeln!(text, "\n## {name}: {triangles} triangles\n");
             let _ = writeln!(
                 text,
-                "The reference, bvh2, equals linear on {linear_rays} rays.\n\n{}",
+                "The reference, {reference}, equals linear on {linear_rays} rays.\n\n{}",
                 builds(&rows).trim_end()
             );
             for set in sets(&rows) {

@@ -6,6 +6,7 @@ use std::sync::{Mutex, PoisonError};
 use glam::DVec3;
 
 use super::contender::{Calls, Contender, EMBREE, Entry};
+use super::loose::Loose;
 use super::rays::View;
 use super::{HitsOut, Options, Row};
 use crate::accel::{Kind, Params};
@@ -18,6 +19,7 @@ use crate::measure::speed::{interleaved, millions_per_second};
 use crate::measure::statistics::Median;
 use crate::progress::Progress;
 use crate::render::Renderer;
+use crate::render::intersect::TwoLevel;
 
 /// Rays that a thread takes at once where there are several threads.
 const PIECE: usize = 4096;
@@ -26,27 +28,64 @@ const PIECE: usize = 4096;
 const UNINTERRUPTED: usize = 1 << 18;
 
 /// What hits are compared with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ReferenceKind {
+    /// The renderer's binary tree.
+    Bvh2,
+    /// A tree with larger boxes that culls nothing: [`Loose`].
+    Loose,
+}
+
+impl ReferenceKind {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Bvh2, Self::Loose];
+
+    /// The name on the command line and in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Bvh2 => "bvh2",
+            Self::Loose => "loose",
+        }
+    }
+}
+
+/// What answers as hits are compared with, and what it is compared with itself.
 pub struct Reference {
     renderer: Renderer,
+    loose: Option<TwoLevel<Loose>>,
     linear: Renderer,
     /// Rays of each set that are compared with `linear`.
     pub checked_a_set: usize,
 }
 
 impl Reference {
-    /// Builds a binary tree, and the list of all triangles that it is compared with on one ray a set.
+    /// Builds a tree, and the list of all triangles that it is compared with on one ray a set.
     ///
     /// # Errors
     /// As [`Renderer::build`].
-    pub fn build(scene: crate::scene::Scene, progress: &dyn Progress) -> Result<Self> {
-        let build = |scene, kind| Renderer::build(scene, &Params { kind, ..Params::default() }, progress);
+    pub fn build(scene: crate::scene::Scene, kind: ReferenceKind, progress: &dyn Progress) -> Result<Self> {
+        let params = |kind| Params { kind, ..Params::default() };
+        let build = |scene, kind| Renderer::build(scene, &params(kind), progress);
+        let loose = match kind {
+            ReferenceKind::Bvh2 => None,
+            // Every instance is asked.
+            ReferenceKind::Loose => Some(TwoLevel::build(&scene, &params(Kind::Linear), progress)?),
+        };
         let linear = build(scene.clone(), Kind::Linear)?;
-        Ok(Self { linear, renderer: build(scene, Kind::Bvh2)?, checked_a_set: 1 })
+        Ok(Self { linear, loose, renderer: build(scene, Kind::Bvh2)?, checked_a_set: 1 })
     }
 
-    /// The binary tree.
+    /// The scene with the renderer's binary tree.
     pub fn renderer(&self) -> &Renderer {
         &self.renderer
+    }
+
+    /// What answers.
+    fn contender(&self) -> (&dyn Contender, ReferenceKind) {
+        match &self.loose {
+            Some(loose) => (loose, ReferenceKind::Loose),
+            None => (&self.renderer, ReferenceKind::Bvh2),
+        }
     }
 
     /// How many rays of a set are compared with `linear`.
@@ -58,18 +97,19 @@ impl Reference {
         set.rays.len().div_ceil(self.checked_a_set.max(1)).max(1)
     }
 
-    /// The answers of the binary tree, a sample of which was compared with those of every triangle asked in turn.
+    /// The answers, a sample of which was compared with those of every triangle asked in turn.
     fn answers(&self, asked: &Asked<'_>, progress: &dyn Progress) -> Result<Answered> {
         let set = asked.set;
+        let (contender, kind) = self.contender();
         let rays = set.rays.iter().step_by(self.stride(set)).copied().collect();
         let sample = RaySet { name: set.name.clone(), group: set.group, question: set.question, rays };
-        let [own, every] = [&self.renderer, &self.linear].map(|asked| answers(asked, Calls::Single, &sample, progress));
+        let [own, every] = [contender, &self.linear].map(|asked| answers(asked, Calls::Single, &sample, progress));
         if let Some(number) = Differences::between(&every?, &own?, false).first {
             let ray = RayText::of(&sample.rays[number], asked.origin);
-            return Err(Error::limit(format!("{}: bvh2 and linear differ on the ray {ray}", asked.model))
-                .remedy("do not rely on this build"));
+            let message = format!("{}: {} and linear differ on the ray {ray}", asked.model, kind.name());
+            return Err(Error::limit(message).remedy("do not rely on this build"));
         }
-        answers(&self.renderer, Calls::Single, set, progress)
+        answers(contender, Calls::Single, set, progress)
     }
 }
 
@@ -366,7 +406,7 @@ mod tests {
             bytes_per_triangle: 1.0,
         };
         let entries = [entry(Box::new(Liar(renderer(Kind::Bvh2))) as _), entry(Box::new(renderer(Kind::CwBvh)) as _)];
-        let reference = Reference::build(scene.clone(), &Silent).unwrap();
+        let reference = Reference::build(scene.clone(), ReferenceKind::Bvh2, &Silent).unwrap();
         let at = |x: f32| Ray::new(glam::Vec3::new(x, 0.1, 5.0), glam::Vec3::NEG_Z);
         let rays = vec![at(0.1), at(7.0), at(-0.2)];
         let set = RaySet { name: "few".into(), group: Group::Generic, question: Question::Closest, rays };
@@ -380,6 +420,7 @@ mod tests {
             calls: Calls::ALL.into(),
             threads: vec![1],
             rounds: 1,
+            reference: ReferenceKind::Bvh2,
             #[cfg(feature = "embree")]
             embree: None,
         };

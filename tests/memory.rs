@@ -1,0 +1,90 @@
+//! How much memory building the default structure takes at its peak, beside the mesh: measured, on Linux, in a process of its own.
+
+use whitted::accel::{Params, TriangleAccelerator, Wide};
+use whitted::geometry::TriangleMesh;
+use whitted::glam::Vec3;
+use whitted::progress::Silent;
+
+/// Hills of `2 side^2` triangles.
+fn hills(side: u32) -> TriangleMesh {
+    let height =
+        |x: f32, z: f32| 0.1 * libm::sinf(9.0 * x) * libm::sinf(7.0 * z) + 0.001 * libm::sinf(900.0 * x + 500.0 * z);
+    let corner = |i: u32| i as f32 / side as f32;
+    let positions =
+        (0..=side).flat_map(|j| (0..=side).map(move |i| Vec3::new(corner(i), height(corner(i), corner(j)), corner(j))));
+    let at = |i: u32, j: u32| j * (side + 1) + i;
+    let square = |i: u32, j: u32| {
+        let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+        [[a, c, b], [a, d, c]]
+    };
+    let indices = (0..side).flat_map(|j| (0..side).flat_map(move |i| square(i, j)));
+    TriangleMesh { positions: positions.collect(), indices: indices.collect(), ..TriangleMesh::default() }
+        .finish()
+        .unwrap()
+}
+
+/// A value of this process's status in bytes.
+fn status(name: &str) -> Option<u64> {
+    let text = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = text.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(':'))?;
+    Some(line.trim().strip_suffix(" kB")?.trim().parse::<u64>().ok()? * 1024)
+}
+
+/// Bytes a triangle that a build adds to what is resident, at its peak and in the end.
+fn peak_and_end(side: u32) -> Option<(f64, f64)> {
+    let mesh = hills(side);
+    // Forget the peak so far.
+    std::fs::write("/proc/self/clear_refs", "5").ok()?;
+    let before = status("VmRSS")?;
+    let wide = Wide::build(&mesh, &Params::default(), &Silent).unwrap();
+    let peak = status("VmHWM")?;
+    let stats = wide.stats();
+    let triangles = mesh.live_count() as f64;
+    Some((peak.saturating_sub(before) as f64 / triangles, (stats.node_bytes + stats.leaf_bytes) as f64 / triangles))
+}
+
+/// Builds in this process, in which nothing else runs, and prints what it took.
+#[test]
+#[ignore = "asked for by the test below, in a process of its own"]
+fn alone() {
+    let side = std::env::var(SIDE).unwrap().parse().unwrap();
+    match peak_and_end(side) {
+        Some((peak, end)) => println!("{PREFIX}{peak} {end}"),
+        None => println!("{PREFIX}"),
+    }
+}
+
+const SIDE: &str = "WHITTED_TEST_SIDE";
+const PREFIX: &str = "peak and end: ";
+
+/// The peak is the tree, 32 bytes for boxes and numbers while it is built, and a chunk a thread, for which there is a margin.
+fn check(side: u32) {
+    let output = std::process::Command::new(std::env::current_exe().unwrap())
+        .args(["memory::alone", "--exact", "--ignored", "--nocapture"])
+        .env(SIDE, side.to_string())
+        .output()
+        .unwrap();
+    let text = String::from_utf8_lossy(&output.stdout);
+    let line = text.lines().find_map(|line| Some(line.split_once(PREFIX)?.1)).unwrap_or_else(|| panic!("{text}"));
+    let numbers: Vec<f64> = line.split_whitespace().map(|number| number.parse().unwrap()).collect();
+    let [peak, end] = numbers[..] else {
+        eprintln!("skipped: this system does not tell how much memory a process takes");
+        return;
+    };
+    println!("{} triangles: {end:.1} bytes each in the end, {peak:.1} at the peak", 2 * side * side);
+    let margin = 48.0 * f64::from(1 << 20) / f64::from(2 * side * side);
+    assert!(end < 64.0, "{end} bytes a triangle");
+    // Debug builds audit the tree as well, on a copy of its triangles.
+    let audit = if cfg!(debug_assertions) { 48.0 } else { 0.0 };
+    assert!(peak < end + 36.0 + margin + audit, "{peak} bytes a triangle at the peak, {end} in the end");
+}
+
+#[test]
+fn a_build_takes_little_more_than_what_it_makes() {
+    check(724);
+    if std::env::var_os("WHITTED_FULL_TESTS").is_some() {
+        check(2237);
+    } else {
+        eprintln!("skipped: 10 million triangles; set WHITTED_FULL_TESTS for them");
+    }
+}
