@@ -51,6 +51,11 @@ fn all_structures_give_the_same_hits_and_the_json_is_documented() {
         );
         let positive = |key: &str| row[key].as_f64().unwrap() > 0.0;
         assert!(positive("mrays_per_s") && positive("build_s") && positive("bytes_per_triangle"), "{row}");
+        // Every triangle, or some and boxes before them.
+        let (boxes, triangles) = (row["boxes_per_ray"].as_f64().unwrap(), row["triangles_per_ray"].as_f64().unwrap());
+        let is_linear = row["accelerator"] == "linear";
+        assert!(is_linear == (boxes == 0.0) && triangles > 0.0 && triangles <= 13.0, "{row}");
+        assert!(!is_linear || triangles == 13.0 || row["ray_kind"] == "shadow", "{row}");
         assert!(row["spread"].as_f64().unwrap() >= 0.0 && row["ratio_to_embree"].is_null(), "{row}");
     }
     for kind in kinds {
@@ -84,6 +89,16 @@ fn tables_name_every_contender_and_the_calls() {
     {
         assert_eq!(page.lines().filter(|line| line.starts_with(contender)).count(), 2, "{contender}: {page}");
     }
+}
+
+#[test]
+fn hits_can_be_compared_with_a_tree_that_culls_nothing() {
+    let workshop = Workshop::new();
+    let bench = document(&workshop, "model.obj --rays 3000 --rounds 0 --reference loose");
+    assert_eq!(bench["models"][0]["reference"], "loose");
+    assert!(rows(&bench).iter().all(|row| row["differing"] == 0));
+    let page = text(&workshop.succeed("bench model.obj --rays 200 --rounds 0 --ray-kinds primary --reference loose"));
+    assert!(page.contains("The reference, loose, equals linear on "), "{page}");
 }
 
 #[test]

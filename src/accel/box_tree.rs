@@ -45,12 +45,18 @@ impl BoxTree {
         mut visit: impl FnMut(u32) -> ControlFlow<(), f32>,
     ) -> ControlFlow<()> {
         let mut bound = far;
-        self.tree.traverse(ray, near, far, |range| {
-            for &number in &self.numbers[range] {
-                bound = visit(number)?;
-            }
-            ControlFlow::Continue(bound)
-        })
+        self.tree.traverse(
+            ray,
+            near,
+            far,
+            |_| {},
+            |range| {
+                for &number in &self.numbers[range] {
+                    bound = visit(number)?;
+                }
+                ControlFlow::Continue(bound)
+            },
+        )
     }
 
     /// The box around all boxes.

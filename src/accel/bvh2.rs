@@ -33,9 +33,10 @@ impl TriangleTree for Bvh2 {
         ray: &PreparedRay,
         near: f32,
         far: f32,
+        compared: impl FnMut(u32),
         mut visit: impl FnMut(&[LeafTriangle]) -> ControlFlow<(), f32>,
     ) -> ControlFlow<()> {
-        self.tree.traverse(ray, near, far, |range| visit(&self.triangles[range]))
+        self.tree.traverse(ray, near, far, compared, |range| visit(&self.triangles[range]))
     }
 
     fn stats(&self) -> TreeStats {

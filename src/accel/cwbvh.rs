@@ -208,6 +208,7 @@ impl TriangleTree for CwBvh {
         ray: &PreparedRay,
         near: f32,
         far: f32,
+        mut compared: impl FnMut(u32),
         mut visit: impl FnMut(&[LeafTriangle]) -> ControlFlow<(), f32>,
     ) -> ControlFlow<()> {
         if self.nodes.is_empty() {
@@ -216,6 +217,7 @@ impl TriangleTree for CwBvh {
         let expand = |number: u32, far: f32, stack: &mut Stack| {
             let node = &self.nodes[number as usize];
             let [entry, exit] = node.intervals(ray, near, far);
+            compared(u32::from(node.count));
             let mut crossed = 0u32;
             for child in 0..WIDTH {
                 crossed |= u32::from(entry[child] <= exit[child]) << child;

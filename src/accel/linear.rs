@@ -1,7 +1,7 @@
 //! Every triangle for every ray: the reference that trees are compared with.
 
 use super::leaf::{LeafTriangle, check_distinct};
-use super::{Params, TreeStats, TriangleAccelerator};
+use super::{Params, Tests, TreeStats, TriangleAccelerator};
 use crate::error::Result;
 use crate::geometry::{Bounds, Hit, Key, PreparedRay, TriangleMesh};
 use crate::progress::{Progress, Share};
@@ -38,6 +38,18 @@ impl TriangleAccelerator for Linear {
         for hit in self.triangles.iter().filter_map(|triangle| triangle.intersect(ray, instance)) {
             if key.is_before(&hit.key()) && hit.key().is_before(&best.key()) {
                 *best = hit;
+            }
+        }
+    }
+
+    fn count(&self, ray: &PreparedRay, any: bool, best: &mut Hit, tests: &mut Tests) {
+        for triangle in &self.triangles {
+            tests.triangles += 1;
+            if let Some(hit) = triangle.intersect(ray, 0).filter(|hit| hit.key().is_before(&best.key())) {
+                *best = hit;
+                if any {
+                    return;
+                }
             }
         }
     }

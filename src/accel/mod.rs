@@ -34,7 +34,7 @@ pub use box_tree::BoxTree;
 pub use bvh2::Bvh2;
 pub use cwbvh::CwBvh;
 pub use linear::Linear;
-pub use stats::TreeStats;
+pub use stats::{Tests, TreeStats};
 /// For `measure`, which compares formulas within one and the same tree.
 #[cfg(feature = "measure")]
 pub(crate) use topology::{Node, Topology};
@@ -221,6 +221,10 @@ pub trait TriangleAccelerator: Sized + Send + Sync {
             *occluded = PreparedRay::clipped(ray, clips.get(at)).is_some_and(|ray| self.occluded(&ray));
         }
     }
+
+    /// [`closest`](Self::closest), or the search of [`occluded`](Self::occluded), which puts the hit that ends it into `best`; and adds what
+    /// that compares the ray with. For numbers about a structure: the searches themselves do not count.
+    fn count(&self, ray: &PreparedRay, any: bool, best: &mut Hit, tests: &mut Tests);
 
     /// Counts and sizes.
     fn stats(&self) -> TreeStats;

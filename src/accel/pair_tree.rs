@@ -88,18 +88,20 @@ impl PairTree {
     }
 
     /// Visits every leaf whose box the ray crosses somewhere in `[near, far]`, the nearer child of a node first; for
-    /// `visit` see [`stack::traverse`].
+    /// `visit` see [`stack::traverse`]. `compared` is told of how many boxes the ray is compared with.
     #[inline(always)]
     pub fn traverse(
         &self,
         ray: &PreparedRay,
         near: f32,
         far: f32,
+        mut compared: impl FnMut(u32),
         visit: impl FnMut(Range<usize>) -> ControlFlow<(), f32>,
     ) -> ControlFlow<()> {
         let expand = |number: u32, far: f32, stack: &mut Stack| {
             let node = &self.nodes[number as usize];
             let [entry, exit] = node.intervals(ray, near, far);
+            compared(2);
             let child = |i: usize| Entry { near: entry[i], first: node.first[i], count: node.count[i] };
             match (entry[0] <= exit[0], entry[1] <= exit[1]) {
                 (true, true) => {

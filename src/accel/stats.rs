@@ -1,5 +1,14 @@
 //! What a structure is made of, in numbers.
 
+/// What a ray was compared with.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Tests {
+    /// Boxes of nodes and of instances.
+    pub boxes: u64,
+    /// Triangles.
+    pub triangles: u64,
+}
+
 /// Counts and sizes of an acceleration structure.
 #[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize)]
 pub struct TreeStats {

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use super::leaf::{LeafTriangle, check_distinct};
 use super::topology::Topology;
-use super::{Params, TreeStats, TriangleAccelerator};
+use super::{Params, Tests, TreeStats, TriangleAccelerator};
 use crate::error::Result;
 use crate::geometry::triangle::hit_bounds;
 use crate::geometry::{Bounds, Hit, Key, PreparedRay, TriangleMesh};
@@ -26,12 +26,13 @@ pub trait TriangleTree: Sized + Send + Sync {
 
     /// Visits every leaf whose box the ray crosses somewhere in `[near, far]`, roughly front to back.
     ///
-    /// `visit` returns the new `far` after each leaf, no larger than before, or breaks off the whole traversal.
+    /// `compared` is told of how many boxes the ray is compared with. `visit` returns the new `far` after each leaf, no larger than before, or breaks off the whole traversal.
     fn traverse(
         &self,
         ray: &PreparedRay,
         near: f32,
         far: f32,
+        compared: impl FnMut(u32),
         visit: impl FnMut(&[LeafTriangle]) -> ControlFlow<(), f32>,
     ) -> ControlFlow<()>;
 
@@ -66,40 +67,83 @@ impl<T: TriangleTree> TriangleAccelerator for T {
     }
 
     fn closest(&self, ray: &PreparedRay, instance: u32, best: &mut Hit) {
-        let _ = self.traverse(ray, ray.lower_bound(ray.t_min), ray.far_bound(best.t), |triangles| {
-            for triangle in triangles {
-                if let Some(hit) = triangle.intersect(ray, instance)
-                    && hit.key().is_before(&best.key())
-                {
-                    *best = hit;
+        let _ = self.traverse(
+            ray,
+            ray.lower_bound(ray.t_min),
+            ray.far_bound(best.t),
+            |_| {},
+            |triangles| {
+                for triangle in triangles {
+                    if let Some(hit) = triangle.intersect(ray, instance)
+                        && hit.key().is_before(&best.key())
+                    {
+                        *best = hit;
+                    }
                 }
-            }
-            ControlFlow::Continue(ray.far_bound(best.t))
-        });
+                ControlFlow::Continue(ray.far_bound(best.t))
+            },
+        );
     }
 
     fn occluded(&self, ray: &PreparedRay) -> bool {
         let far = ray.upper_bound(ray.t_max);
-        let search = self.traverse(ray, ray.lower_bound(ray.t_min), far, |triangles| {
-            let blocked = triangles.iter().any(|triangle| triangle.intersect(ray, 0).is_some());
-            if blocked { ControlFlow::Break(()) } else { ControlFlow::Continue(far) }
-        });
+        let search = self.traverse(
+            ray,
+            ray.lower_bound(ray.t_min),
+            far,
+            |_| {},
+            |triangles| {
+                let blocked = triangles.iter().any(|triangle| triangle.intersect(ray, 0).is_some());
+                if blocked { ControlFlow::Break(()) } else { ControlFlow::Continue(far) }
+            },
+        );
         search.is_break()
     }
 
     fn next_after(&self, ray: &PreparedRay, instance: u32, key: Key, best: &mut Hit) {
         let near = ray.lower_bound(ray.t_min).max(ray.lower_bound(key.t));
-        let _ = self.traverse(ray, near, ray.far_bound(best.t), |triangles| {
-            for triangle in triangles {
-                if let Some(hit) = triangle.intersect(ray, instance)
-                    && key.is_before(&hit.key())
-                    && hit.key().is_before(&best.key())
-                {
-                    *best = hit;
+        let _ = self.traverse(
+            ray,
+            near,
+            ray.far_bound(best.t),
+            |_| {},
+            |triangles| {
+                for triangle in triangles {
+                    if let Some(hit) = triangle.intersect(ray, instance)
+                        && key.is_before(&hit.key())
+                        && hit.key().is_before(&best.key())
+                    {
+                        *best = hit;
+                    }
                 }
-            }
-            ControlFlow::Continue(ray.far_bound(best.t))
-        });
+                ControlFlow::Continue(ray.far_bound(best.t))
+            },
+        );
+    }
+
+    fn count(&self, ray: &PreparedRay, any: bool, best: &mut Hit, tests: &mut Tests) {
+        let far = |best: &Hit| if any { ray.upper_bound(ray.t_max) } else { ray.far_bound(best.t) };
+        let (mut boxes, mut met) = (0, 0);
+        let _ = self.traverse(
+            ray,
+            ray.lower_bound(ray.t_min),
+            far(best),
+            |more| boxes += u64::from(more),
+            |triangles| {
+                for triangle in triangles {
+                    met += 1;
+                    if let Some(hit) = triangle.intersect(ray, 0).filter(|hit| hit.key().is_before(&best.key())) {
+                        *best = hit;
+                        if any {
+                            return ControlFlow::Break(());
+                        }
+                    }
+                }
+                ControlFlow::Continue(far(best))
+            },
+        );
+        tests.boxes += boxes;
+        tests.triangles += met;
     }
 
     fn stats(&self) -> TreeStats {

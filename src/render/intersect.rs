@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 
 use rayon::prelude::*;
 
-use crate::accel::{BoxTree, Kind, Params, TreeStats, TriangleAccelerator};
+use crate::accel::{BoxTree, Kind, Params, Tests, TreeStats, TriangleAccelerator};
 use crate::error::Result;
 use crate::geometry::ray::Interval;
 use crate::geometry::{Bounds, Hit, Key, PreparedRay, Quadric, Ray};
@@ -173,6 +173,58 @@ impl<A: TriangleAccelerator> TwoLevel<A> {
             }
             Top::Single | Top::Linear => Ok(()),
         }
+    }
+
+    /// What the search for a ray's first hit, or for any, compares it with. Quadrics are not counted, but their boxes are.
+    pub fn count(&self, ray: &Ray, any: bool) -> Tests {
+        let (mut best, mut tests) = (Hit::MISS, Tests::default());
+        let Some(ray) = PreparedRay::new(ray) else { return tests };
+        let all = 0..self.world.instances.len() as u32;
+        match &self.top {
+            Top::Single => self.meshes[0].count(&ray, any, &mut best, &mut tests),
+            Top::Linear => {
+                let _ = all.into_iter().try_for_each(|number| self.count_one(number, &ray, any, &mut best, &mut tests));
+            }
+            Top::Tree { tree, unbounded } => {
+                let first = unbounded.iter();
+                let found =
+                    first.copied().try_for_each(|number| self.count_one(number, &ray, any, &mut best, &mut tests));
+                if found.is_continue() {
+                    let far = |best: &Hit| if best.t < ray.t_max { best.t } else { ray.t_max };
+                    let _ = tree.traverse(&ray, ray.t_min, far(&best), |number| {
+                        self.count_one(number, &ray, any, &mut best, &mut tests)?;
+                        ControlFlow::Continue(far(&best))
+                    });
+                }
+            }
+        }
+        tests
+    }
+
+    /// [`meet`](Self::meet) with counts; breaks off where any hit will do and one was found.
+    fn count_one(
+        &self,
+        number: u32,
+        ray: &PreparedRay,
+        any: bool,
+        best: &mut Hit,
+        tests: &mut Tests,
+    ) -> ControlFlow<()> {
+        tests.boxes += 1;
+        let instance = &self.world.instances[number as usize];
+        let clip = instance.clip(ray);
+        if !(clip.is_empty() || clip.near > best.t || clip.near > ray.t_max || clip.far < ray.t_min) {
+            match instance.shape {
+                Shape::Mesh(mesh) => {
+                    let local = if instance.is_unmoved() { Some(*ray) } else { instance.local_ray(ray, clip) };
+                    if let Some(local) = local {
+                        self.meshes[mesh as usize].count(&local, any, best, tests);
+                    }
+                }
+                Shape::Quadric(quadric) => self.meet_quadric(quadric, number, ray, clip, None, best),
+            }
+        }
+        if any && best.is_hit() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
     /// The first hit strictly after `after` on wanted instances.

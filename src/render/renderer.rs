@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use crate::accel::{Bvh2, CwBvh, Linear, Params, Wide};
+use crate::accel::{Bvh2, CwBvh, Linear, Params, Tests, Wide};
 use crate::error::Result;
 use crate::geometry::{Hit, Key, Ray};
 use crate::progress::Progress;
@@ -114,6 +114,11 @@ impl Renderer {
     /// Whether anything is hit, whatever its material.
     pub fn occluded(&self, ray: &Ray) -> bool {
         with_structure!(&self.intersect, structure => structure.occluded(ray))
+    }
+
+    /// What the search for the closest hit, or for any, compares a ray with.
+    pub fn count(&self, ray: &Ray, any: bool) -> Tests {
+        with_structure!(&self.intersect, structure => structure.count(ray, any))
     }
 
     /// The first hit after `key`; start from [`Key::BEFORE_ALL`] and go on from each hit's key to visit them all.

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::meshes::Random;
-use crate::accel::{Kind, Linear, Params, Preset, TreeStats, TriangleAccelerator, dispatch_kind};
+use crate::accel::{Kind, Linear, Params, Preset, Tests, TreeStats, TriangleAccelerator, dispatch_kind};
 use crate::geometry::ray::Interval;
 use crate::geometry::{Hit, Key, PreparedRay, Ray, TriangleMesh};
 use crate::math::random::hash2;
@@ -97,7 +97,26 @@ fn answer<A: TriangleAccelerator>(accelerator: &A, ray: &PreparedRay) -> Answer 
         key = next.key();
         walk.push(bytemuck::cast(next));
     }
-    Answer { closest: bytemuck::cast(closest), occluded: accelerator.occluded(ray), walk }
+    let occluded = accelerator.occluded(ray);
+    check_counts(accelerator, ray, &closest, occluded);
+    Answer { closest: bytemuck::cast(closest), occluded, walk }
+}
+
+/// Searches that count must come to the same, and count what they need to get there.
+fn check_counts<A: TriangleAccelerator>(accelerator: &A, ray: &PreparedRay, closest: &Hit, occluded: bool) {
+    let mut counted = [(Hit::MISS, Tests::default()); 2];
+    for (any, (hit, tests)) in counted.iter_mut().enumerate() {
+        accelerator.count(ray, any == 1, hit, tests);
+    }
+    let [(first, all), (some, few)] = counted;
+    let expected = if closest.is_hit() { Hit { instance: 0, ..*closest } } else { *closest };
+    assert_eq!((first, some.is_hit()), (expected, occluded), "{} {ray:?} counted", A::NAME);
+    let stats = accelerator.stats();
+    assert!(all.triangles.max(few.triangles) <= stats.triangles, "{}: {all:?} {few:?}", A::NAME);
+    assert!(!occluded || all.triangles.min(few.triangles) > 0, "{}: {all:?} {few:?}", A::NAME);
+    assert!(stats.nodes < 2 || all.boxes.min(few.boxes) > 0, "{}: {all:?} {few:?}", A::NAME);
+    // Without a hit nothing is culled but by the ray's own ends.
+    assert!(occluded || all == few, "{}: {all:?} {few:?}", A::NAME);
 }
 
 fn answers<A: TriangleAccelerator>(

@@ -126,10 +126,16 @@ fn a_closed_sphere_has_no_leaks() {
 fn leaves_visited<T: TriangleTree>(mesh: &TriangleMesh, ray: &PreparedRay, near: f32, far: f32) -> u32 {
     let tree = <T as TriangleAccelerator>::build(mesh, &Params::default(), &Silent).unwrap();
     let mut visited = 0;
-    let _ = tree.traverse(ray, near, far, |_| {
-        visited += 1;
-        ControlFlow::Continue(far)
-    });
+    let _ = tree.traverse(
+        ray,
+        near,
+        far,
+        |_| {},
+        |_| {
+            visited += 1;
+            ControlFlow::Continue(far)
+        },
+    );
     visited
 }
 

@@ -8,6 +8,7 @@
 mod build;
 mod chunks;
 mod collapse;
+mod count;
 mod leaf;
 mod node;
 pub mod simd;
@@ -21,7 +22,7 @@ use simd::{Closest, Level, NextAfter, Occluded};
 
 use super::leaf::{check_distinct, check_partition};
 use super::topology::half_area;
-use super::{Params, TreeStats, TriangleAccelerator};
+use super::{Params, Tests, TreeStats, TriangleAccelerator};
 use crate::error::{Error, Result};
 use crate::geometry::ray::Interval;
 use crate::geometry::{Bounds, Hit, Key, PreparedRay, Ray, TriangleMesh};
@@ -123,6 +124,10 @@ impl TriangleAccelerator for Wide {
     #[inline(always)]
     fn occluded_batch(&self, rays: &[Ray], clips: &[Interval], occluded: &mut [bool]) {
         simd::occluded_batch(self.level, &self.tree, rays, clips, occluded);
+    }
+
+    fn count(&self, ray: &PreparedRay, any: bool, best: &mut Hit, tests: &mut Tests) {
+        count::count(&self.tree, ray, any, best, tests);
     }
 
     fn stats(&self) -> TreeStats {

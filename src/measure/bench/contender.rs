@@ -4,7 +4,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use crate::accel::{Kind, Params, Preset, TriangleAccelerator};
+use crate::accel::{Kind, Params, Preset, Tests, TriangleAccelerator};
 use crate::error::{Error, Result};
 use crate::geometry::{Hit, Ray};
 #[cfg(feature = "embree")]
@@ -47,6 +47,11 @@ pub trait Contender: Sync {
 
     /// Whether each ray hits anything; the slices have equal lengths.
     fn occluded(&self, calls: Calls, rays: &[Ray], occluded: &mut [bool]);
+
+    /// What a single call for the closest hit, or for any, compares a ray with; `None` if it does not tell.
+    fn tests(&self, _ray: &Ray, _any: bool) -> Option<Tests> {
+        None
+    }
 }
 
 /// A contender with all that was found out about it while it was built.
@@ -87,6 +92,10 @@ impl Contender for Renderer {
             Calls::Single => rays.iter().zip(flags).for_each(|(ray, flag)| *flag = occluded(self, ray)),
             Calls::Batch => self.occluded_batch(rays, flags),
         }
+    }
+
+    fn tests(&self, ray: &Ray, any: bool) -> Option<Tests> {
+        Some(self.count(ray, any))
     }
 }
 

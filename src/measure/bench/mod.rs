@@ -137,6 +137,10 @@ pub struct Row {
     pub spread: Option<f64>,
     /// Times as fast as Embree's single rays, fast, with as many threads in the same rounds; null without.
     pub ratio_to_embree: Option<f64>,
+    /// Boxes that a single call compares a ray with, on average over some of the rays; null of peers.
+    pub boxes_per_ray: Option<f64>,
+    /// The same of triangles.
+    pub triangles_per_ray: Option<f64>,
     /// Rays that were answered by a hit.
     pub hits: u64,
     /// Fingerprint of the answers as `query` writes them.

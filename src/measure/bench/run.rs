@@ -32,7 +32,7 @@ const UNINTERRUPTED: usize = 1 << 18;
 pub enum ReferenceKind {
     /// The renderer's binary tree.
     Bvh2,
-    /// A tree with larger boxes that culls nothing: [`Loose`].
+    /// A tree with larger boxes that culls nothing.
     Loose,
 }
 
@@ -113,6 +113,20 @@ impl Reference {
     }
 }
 
+/// Boxes and triangles that a ray of a set is compared with: the means over some thousand of them.
+fn mean_tests(contender: &dyn Contender, set: &RaySet) -> Option<[f64; 2]> {
+    const SAMPLE: usize = 10_000;
+    let rays = set.rays.iter().step_by(set.rays.len().div_ceil(SAMPLE).max(1));
+    let (mut boxes, mut triangles, mut count) = (0, 0, 0u64);
+    for ray in rays {
+        let tests = contender.tests(ray, set.question == Question::Occluded)?;
+        boxes += tests.boxes;
+        triangles += tests.triangles;
+        count += 1;
+    }
+    Some([boxes, triangles].map(|sum| sum as f64 / count.max(1) as f64))
+}
+
 /// A set of rays of a model.
 pub struct Asked<'a> {
     /// The rays.
@@ -158,6 +172,7 @@ pub fn ask(
                 written = Some(out.append(&records(&found)).map_err(failed)?);
             }
             let differences = Differences::between(&expected, &found, entry.peer);
+            let tests = mean_tests(entry.contender.as_ref(), set);
             let text = |ray: usize| RayText::of(&set.rays[ray], asked.origin).to_string();
             rows.extend(own.iter().map(|turn| Row {
                 model: asked.model.into(),
@@ -173,6 +188,8 @@ pub fn ask(
                 mrays_per_s: None,
                 spread: None,
                 ratio_to_embree: None,
+                boxes_per_ray: tests.map(|[boxes, _]| boxes),
+                triangles_per_ray: tests.map(|[_, triangles]| triangles),
                 hits: found.hits_in_first(set.rays.len()),
                 hit_hash: found.hash(),
                 differing: differences.count,
