@@ -62,6 +62,7 @@ fn check(side: u32) {
     let output = std::process::Command::new(std::env::current_exe().unwrap())
         .args(["memory::alone", "--exact", "--ignored", "--nocapture"])
         .env(SIDE, side.to_string())
+        .env("RAYON_NUM_THREADS", "2")
         .output()
         .unwrap();
     let text = String::from_utf8_lossy(&output.stdout);

@@ -42,21 +42,28 @@ impl BoxTree {
         ray: &PreparedRay,
         near: f32,
         far: f32,
+        visit: impl FnMut(u32) -> ControlFlow<(), f32>,
+    ) -> ControlFlow<()> {
+        self.traverse_and_tell(ray, near, far, |_| {}, visit)
+    }
+
+    /// [`traverse`](Self::traverse) that tells `compared` of how many boxes of nodes the ray is compared with.
+    #[inline]
+    pub fn traverse_and_tell(
+        &self,
+        ray: &PreparedRay,
+        near: f32,
+        far: f32,
+        compared: impl FnMut(u32),
         mut visit: impl FnMut(u32) -> ControlFlow<(), f32>,
     ) -> ControlFlow<()> {
         let mut bound = far;
-        self.tree.traverse(
-            ray,
-            near,
-            far,
-            |_| {},
-            |range| {
-                for &number in &self.numbers[range] {
-                    bound = visit(number)?;
-                }
-                ControlFlow::Continue(bound)
-            },
-        )
+        self.tree.traverse(ray, near, far, compared, |range| {
+            for &number in &self.numbers[range] {
+                bound = visit(number)?;
+            }
+            ControlFlow::Continue(bound)
+        })
     }
 
     /// The box around all boxes.

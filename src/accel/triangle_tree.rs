@@ -26,7 +26,8 @@ pub trait TriangleTree: Sized + Send + Sync {
 
     /// Visits every leaf whose box the ray crosses somewhere in `[near, far]`, roughly front to back.
     ///
-    /// `compared` is told of how many boxes the ray is compared with. `visit` returns the new `far` after each leaf, no larger than before, or breaks off the whole traversal.
+    /// `compared` is told of how many boxes the ray is compared with. `visit` returns the new `far` after each leaf, no larger than
+    /// before, or breaks off the whole traversal.
     fn traverse(
         &self,
         ray: &PreparedRay,

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use crate::accel::{BoxTree, Kind, Params, Tests, TreeStats, TriangleAccelerator};
 use crate::error::Result;
 use crate::geometry::ray::Interval;
-use crate::geometry::{Bounds, Hit, Key, PreparedRay, Quadric, Ray};
+use crate::geometry::{Bounds, Hit, Key, PreparedRay, Quadric, Ray, TriangleMesh};
 use crate::progress::Progress;
 use crate::render::world::{Instance, World};
 use crate::scene::{Scene, Shape, compiled};
@@ -82,6 +82,9 @@ pub(super) enum Top {
     Linear,
 }
 
+/// The most triangles of a mesh that one thread builds.
+const SMALL: usize = 1 << 14;
+
 /// The instances' boxes; empty for those without end.
 fn boxes(instances: &[Instance]) -> Vec<Bounds> {
     instances.iter().map(|instance| instance.bounds.unwrap_or(Bounds::EMPTY)).collect()
@@ -122,9 +125,13 @@ impl<A: TriangleAccelerator> TwoLevel<A> {
     pub fn build(scene: &Scene, params: &Params, progress: &dyn Progress) -> Result<Self> {
         let world = World::new(scene)?;
         let instances = &world.instances;
-        // Small meshes side by side; what is large is built on all threads itself.
-        let build = |mesh| A::build(mesh, params, progress);
-        let meshes = scene.meshes.par_iter().map(build).collect::<Result<Vec<_>>>()?;
+        // Small meshes side by side; what is large is built on all threads by itself, one after the other for the sake of memory.
+        let build = |mesh: &TriangleMesh| A::build(mesh, params, progress);
+        let is_small = |mesh: &TriangleMesh| mesh.live_count() <= SMALL;
+        let small = scene.meshes.par_iter().map(|mesh| is_small(mesh).then(|| build(mesh)).transpose());
+        let small = small.collect::<Result<Vec<_>>>()?;
+        let meshes = scene.meshes.iter().zip(small).map(|(mesh, built)| built.map_or_else(|| build(mesh), Ok));
+        let meshes = meshes.collect::<Result<Vec<_>>>()?;
         let single = matches!(instances.as_slice(), [one] if one.identity && one.shape == Shape::Mesh(0));
         let top = if single {
             Top::Single
@@ -191,10 +198,13 @@ impl<A: TriangleAccelerator> TwoLevel<A> {
                     first.copied().try_for_each(|number| self.count_one(number, &ray, any, &mut best, &mut tests));
                 if found.is_continue() {
                     let far = |best: &Hit| if best.t < ray.t_max { best.t } else { ray.t_max };
-                    let _ = tree.traverse(&ray, ray.t_min, far(&best), |number| {
+                    let mut boxes = 0;
+                    let compared = |more| boxes += u64::from(more);
+                    let _ = tree.traverse_and_tell(&ray, ray.t_min, far(&best), compared, |number| {
                         self.count_one(number, &ray, any, &mut best, &mut tests)?;
                         ControlFlow::Continue(far(&best))
                     });
+                    tests.boxes += boxes;
                 }
             }
         }
@@ -418,7 +428,6 @@ impl<A: TriangleAccelerator> Intersect for TwoLevel<A> {
 mod tests {
     use super::*;
     use crate::accel::Wide;
-    use crate::geometry::TriangleMesh;
     use crate::math::random::Random;
     use crate::progress::Silent;
     use crate::scene::{Material, Object};

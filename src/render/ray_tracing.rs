@@ -263,6 +263,9 @@ impl<F: FnMut(u32, u32, Pixel)> Samples<'_, F> {
 
     /// Traces what there is.
     fn trace<I: Answers>(&mut self, tracer: &Tracer<'_, I>) {
+        if self.count() == 0 {
+            return;
+        }
         let (colors, hits) = tracer.trace_cameras(std::mem::replace(&mut self.views, Vec::with_capacity(LARGEST)));
         let blind = std::mem::take(&mut self.blind);
         let mut blind = blind.into_iter().peekable();

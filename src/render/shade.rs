@@ -162,8 +162,8 @@ fn direct(material: &Material, diffuse: Rgb, point: &SurfacePoint, view: &ViewRa
     sum
 }
 
-/// Out of line, since most materials have none: `x^n` for x in (0, 1]; whole exponents by repeated squaring, others by `libm`. At most 1: R.V of unit vectors may
-/// exceed 1 by rounding.
+/// `x^n` for x in (0, 1]; whole exponents by repeated squaring, others by `libm`. At most 1: R.V of unit vectors may
+/// exceed 1 by rounding. Out of line, since most materials have no highlight.
 #[inline(never)]
 fn highlight(x: f64, n: f32) -> f64 {
     let x = x.min(1.0);

@@ -10,17 +10,22 @@ use std::mem;
 use glam::Vec3;
 use rayon::prelude::*;
 
+use super::collapse::EVEN_DEPTH;
 use super::node::{Child, Node, WIDTH};
 use crate::accel::topology::half_area;
 use crate::geometry::triangle::hit_bounds;
 use crate::geometry::{Bounds, TriangleMesh};
 
-/// The most triangles of a chunk.
+/// The most triangles of a chunk. Chunks of 4,096 make rays in Sponza cost up to 11 % more; with 65,536 a dragon of 871 k triangles is built
+/// as fast, within what was told apart, but less evenly on many threads.
 pub const MOST: usize = 1 << 14;
 
 /// From this depth on triangles are cut in equal halves, so that the tree over 2^28 triangles' chunks stays less deep than
-/// [`EVEN_DEPTH`](super::collapse::EVEN_DEPTH).
+/// [`EVEN_DEPTH`].
 const EQUAL_DEPTH: usize = 20;
+
+/// Halving ends at one chunk, and rounding may add a level.
+const _: () = assert!(EVEN_DEPTH > EQUAL_DEPTH + (Child::MOST / MOST).ilog2() as usize);
 
 /// Bins an axis.
 const BINS: usize = 32;
@@ -310,11 +315,23 @@ mod tests {
 
     #[test]
     fn ever_smaller_triangles_do_not_make_the_tree_deep() {
-        // The cut that costs least leaves all but few on one side.
-        let mut references: Vec<_> = (0..4 * MOST as u32)
-            .map(|number| reference(number, Vec3::X * libm::exp2f(-(number as f32) / 512.0)))
+        fn depth(part: &Part<'_>) -> usize {
+            match &part.content {
+                Content::Chunk(_) => 0,
+                Content::Pair(pair) => 1 + pair.iter().map(depth).max().unwrap_or(0),
+            }
+        }
+        // 16 in each octave from 2^120 to 2^-120 and many in the next, so that each cut that costs least leaves all but some on one side.
+        let octaves = (0..240).flat_map(|octave| [octave; 16]).chain([240; 4 * MOST]);
+        let mut references: Vec<_> = octaves
+            .enumerate()
+            .map(|(number, octave)| {
+                let size = libm::exp2f((120 - octave) as f32);
+                let min = Vec3::X * (size * (1.0 + number as f32 / 1e6));
+                Reference { bounds: Bounds { min, max: min + Vec3::splat(0.1 * size) }, primitive: number as u32 }
+            })
             .collect();
-        let sizes = cut_and_check(&mut references);
-        assert!(sizes.iter().all(|&(_, depth)| depth <= EQUAL_DEPTH + 3), "{sizes:?}");
+        let deep = depth(&cut(&mut references, 0));
+        assert!((EQUAL_DEPTH + 1..=EQUAL_DEPTH + 3).contains(&deep), "{deep}");
     }
 }

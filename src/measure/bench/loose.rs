@@ -2,7 +2,8 @@
 //!
 //! Its boxes are larger than they need be, by thousands of roundings, and are compared in f64 with the whole line: none is passed
 //! by for what was hit before it, or for where a ray starts and ends. It shares the triangle test with the renderer's
-//! structures, which is what decides hits, and nothing else: neither builder, nor layout, nor box test.
+//! structures, which is what decides hits, and nothing else: neither builder, nor layout, nor box test. Where a scene has several
+//! instances those are asked in turn, each in its own box, as [`Linear`](crate::accel::Linear) is.
 
 use glam::{DVec3, Vec3};
 

@@ -4,8 +4,8 @@
 //! model -> reference -> rays -> contenders -> equal hits? -> interleaved rounds -> rows -> tables, JSON, SVG
 //! ```
 //!
-//! The reference is `bvh2`, or a tree that is too slow to be wrong; itself it is compared with every triangle asked in turn. Nothing is timed whose hits are not equal to it
-//! bit for bit, but for other programs, of which is told how often they differ.
+//! The reference is `bvh2`, or a tree that is too slow to be wrong; itself it is compared with every triangle asked in turn. Nothing
+//! is timed whose hits are not equal to it bit for bit, but for other programs, of which is told how often they differ.
 
 mod contender;
 mod document;

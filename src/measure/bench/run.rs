@@ -113,18 +113,23 @@ impl Reference {
     }
 }
 
-/// Boxes and triangles that a ray of a set is compared with: the means over some thousand of them.
-fn mean_tests(contender: &dyn Contender, set: &RaySet) -> Option<[f64; 2]> {
+/// Boxes and triangles that a ray of a set is compared with: the means over some thousand of them, or as many as take a second.
+fn mean_tests(contender: &dyn Contender, set: &RaySet, progress: &dyn Progress) -> Result<Option<[f64; 2]>> {
     const SAMPLE: usize = 10_000;
+    const MOST_TRIANGLES: u64 = 50_000_000;
     let rays = set.rays.iter().step_by(set.rays.len().div_ceil(SAMPLE).max(1));
     let (mut boxes, mut triangles, mut count) = (0, 0, 0u64);
     for ray in rays {
-        let tests = contender.tests(ray, set.question == Question::Occluded)?;
+        progress.check()?;
+        let Some(tests) = contender.tests(ray, set.question == Question::Occluded) else { return Ok(None) };
         boxes += tests.boxes;
         triangles += tests.triangles;
         count += 1;
+        if triangles > MOST_TRIANGLES {
+            break;
+        }
     }
-    Some([boxes, triangles].map(|sum| sum as f64 / count.max(1) as f64))
+    Ok(Some([boxes, triangles].map(|sum| sum as f64 / count.max(1) as f64)))
 }
 
 /// A set of rays of a model.
@@ -159,6 +164,7 @@ pub fn ask(
     let mut rows: Vec<Row> = Vec::new();
     for (number, entry) in entries.iter().enumerate() {
         let mut written = None;
+        let tests = mean_tests(entry.contender.as_ref(), set, progress)?;
         for calls in Calls::ALL {
             let own: Vec<&Turn> = turns.iter().filter(|turn| turn.entry == number && turn.calls == calls).collect();
             if own.is_empty() {
@@ -172,7 +178,6 @@ pub fn ask(
                 written = Some(out.append(&records(&found)).map_err(failed)?);
             }
             let differences = Differences::between(&expected, &found, entry.peer);
-            let tests = mean_tests(entry.contender.as_ref(), set);
             let text = |ray: usize| RayText::of(&set.rays[ray], asked.origin).to_string();
             rows.extend(own.iter().map(|turn| Row {
                 model: asked.model.into(),

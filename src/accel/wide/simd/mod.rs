@@ -2,7 +2,7 @@
 //!
 //! Every set gives the same bits: no operation here is fused, and comparisons with NaN come out as in [`Portable`], which is
 //! the scalar twin of the others. This is the one place of the accelerators with `unsafe` code: searches read nodes and
-//! leaves without checks, and instructions are used that not every processor has. What makes it sound: a [`Level`] is only
+//! leaves without checks, instructions are used that not every processor has, and the system is asked for large pages. What makes it sound: a [`Level`] is only
 //! ever one that the processor has, and [`Tree`](super::Tree) is only made of nodes whose children are in range.
 #![allow(unsafe_code)]
 
