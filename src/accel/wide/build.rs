@@ -42,6 +42,9 @@ pub fn build(mesh: &TriangleMesh, preset: Preset, progress: &dyn Progress) -> Re
     let takers = rayon::current_num_threads().min(chunks.len());
     (0..takers).into_par_iter().with_max_len(1).try_for_each(|_| work())?;
     let assembly = assembly.into_inner().expect("no thread panics with it");
+    // Before the finished nodes are copied.
+    drop(chunks);
+    drop(references);
     Ok((assembly.finish(), bounds))
 }
 
