@@ -1,7 +1,7 @@
 //! Every triangle for every ray: the reference that trees are compared with.
 
 use super::leaf::{LeafTriangle, check_distinct};
-use super::{Params, Tests, TreeStats, TriangleAccelerator};
+use super::{Counting, Params, Tests, TreeStats, TriangleAccelerator};
 use crate::error::Result;
 use crate::geometry::{Bounds, Hit, Key, PreparedRay, TriangleMesh};
 use crate::progress::{Progress, Share};
@@ -42,18 +42,6 @@ impl TriangleAccelerator for Linear {
         }
     }
 
-    fn count(&self, ray: &PreparedRay, any: bool, best: &mut Hit, tests: &mut Tests) {
-        for triangle in &self.triangles {
-            tests.triangles += 1;
-            if let Some(hit) = triangle.intersect(ray, 0).filter(|hit| hit.key().is_before(&best.key())) {
-                *best = hit;
-                if any {
-                    return;
-                }
-            }
-        }
-    }
-
     fn stats(&self) -> TreeStats {
         let count = self.triangles.len() as u64;
         TreeStats {
@@ -75,5 +63,19 @@ impl TriangleAccelerator for Linear {
 
     fn bounds(&self) -> Bounds {
         self.bounds
+    }
+}
+
+impl Counting for Linear {
+    fn count(&self, ray: &PreparedRay, any: bool, best: &mut Hit, tests: &mut Tests) {
+        for triangle in &self.triangles {
+            tests.triangles += 1;
+            if let Some(hit) = triangle.intersect(ray, 0).filter(|hit| hit.key().is_before(&best.key())) {
+                *best = hit;
+                if any {
+                    return;
+                }
+            }
+        }
     }
 }

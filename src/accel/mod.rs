@@ -145,6 +145,9 @@ impl Preset {
     pub const ALL: &[Self] = &[Self::Fast, Self::Balanced, Self::Best];
 }
 
+/// The most triangles that one thread builds a tree over; more are shared among all.
+pub const ONE_THREAD: usize = 1 << 14;
+
 /// How to build acceleration structures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Params {
@@ -152,6 +155,13 @@ pub struct Params {
     pub kind: Kind,
     /// How much time the build may take.
     pub preset: Preset,
+}
+
+/// A structure that tells what its searches compare rays with.
+pub trait Counting: TriangleAccelerator {
+    /// [`closest`](TriangleAccelerator::closest), or the search of [`occluded`](TriangleAccelerator::occluded), which puts the hit that ends it
+    /// into `best`; and adds what that compares the ray with. The searches themselves do not count.
+    fn count(&self, ray: &PreparedRay, any: bool, best: &mut Hit, tests: &mut Tests);
 }
 
 /// A bottom-level structure over one mesh's triangles that owns its leaf layout.
@@ -221,10 +231,6 @@ pub trait TriangleAccelerator: Sized + Send + Sync {
             *occluded = PreparedRay::clipped(ray, clips.get(at)).is_some_and(|ray| self.occluded(&ray));
         }
     }
-
-    /// [`closest`](Self::closest), or the search of [`occluded`](Self::occluded), which puts the hit that ends it into `best`; and adds what
-    /// that compares the ray with. For numbers about a structure: the searches themselves do not count.
-    fn count(&self, ray: &PreparedRay, any: bool, best: &mut Hit, tests: &mut Tests);
 
     /// Counts and sizes.
     fn stats(&self) -> TreeStats;

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use super::leaf::{LeafTriangle, check_distinct};
 use super::topology::Topology;
-use super::{Params, Tests, TreeStats, TriangleAccelerator};
+use super::{Counting, Params, Tests, TreeStats, TriangleAccelerator};
 use crate::error::Result;
 use crate::geometry::triangle::hit_bounds;
 use crate::geometry::{Bounds, Hit, Key, PreparedRay, TriangleMesh};
@@ -122,6 +122,21 @@ impl<T: TriangleTree> TriangleAccelerator for T {
         );
     }
 
+    fn stats(&self) -> TreeStats {
+        TriangleTree::stats(self)
+    }
+
+    fn validate(&self) -> std::result::Result<(), String> {
+        check_distinct(self.triangles())?;
+        self.validate_nodes()
+    }
+
+    fn bounds(&self) -> Bounds {
+        TriangleTree::bounds(self)
+    }
+}
+
+impl<T: TriangleTree> Counting for T {
     fn count(&self, ray: &PreparedRay, any: bool, best: &mut Hit, tests: &mut Tests) {
         let far = |best: &Hit| if any { ray.upper_bound(ray.t_max) } else { ray.far_bound(best.t) };
         let (mut boxes, mut met) = (0, 0);
@@ -145,18 +160,5 @@ impl<T: TriangleTree> TriangleAccelerator for T {
         );
         tests.boxes += boxes;
         tests.triangles += met;
-    }
-
-    fn stats(&self) -> TreeStats {
-        TriangleTree::stats(self)
-    }
-
-    fn validate(&self) -> std::result::Result<(), String> {
-        check_distinct(self.triangles())?;
-        self.validate_nodes()
-    }
-
-    fn bounds(&self) -> Bounds {
-        TriangleTree::bounds(self)
     }
 }

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 
 use rayon::prelude::*;
 
-use crate::accel::{BoxTree, Kind, Params, Tests, TreeStats, TriangleAccelerator};
+use crate::accel::{self, BoxTree, Counting, Kind, Params, Tests, TreeStats, TriangleAccelerator};
 use crate::error::Result;
 use crate::geometry::ray::Interval;
 use crate::geometry::{Bounds, Hit, Key, PreparedRay, Quadric, Ray, TriangleMesh};
@@ -82,9 +82,6 @@ pub(super) enum Top {
     Linear,
 }
 
-/// The most triangles of a mesh that one thread builds.
-const SMALL: usize = 1 << 14;
-
 /// The instances' boxes; empty for those without end.
 fn boxes(instances: &[Instance]) -> Vec<Bounds> {
     instances.iter().map(|instance| instance.bounds.unwrap_or(Bounds::EMPTY)).collect()
@@ -127,7 +124,7 @@ impl<A: TriangleAccelerator> TwoLevel<A> {
         let instances = &world.instances;
         // Small meshes side by side; what is large is built on all threads by itself, one after the other for the sake of memory.
         let build = |mesh: &TriangleMesh| A::build(mesh, params, progress);
-        let is_small = |mesh: &TriangleMesh| mesh.live_count() <= SMALL;
+        let is_small = |mesh: &TriangleMesh| mesh.live_count() <= accel::ONE_THREAD;
         let small = scene.meshes.par_iter().map(|mesh| is_small(mesh).then(|| build(mesh)).transpose());
         let small = small.collect::<Result<Vec<_>>>()?;
         let meshes = scene.meshes.iter().zip(small).map(|(mesh, built)| built.map_or_else(|| build(mesh), Ok));
@@ -180,61 +177,6 @@ impl<A: TriangleAccelerator> TwoLevel<A> {
             }
             Top::Single | Top::Linear => Ok(()),
         }
-    }
-
-    /// What the search for a ray's first hit, or for any, compares it with. Quadrics are not counted, but their boxes are.
-    pub fn count(&self, ray: &Ray, any: bool) -> Tests {
-        let (mut best, mut tests) = (Hit::MISS, Tests::default());
-        let Some(ray) = PreparedRay::new(ray) else { return tests };
-        let all = 0..self.world.instances.len() as u32;
-        match &self.top {
-            Top::Single => self.meshes[0].count(&ray, any, &mut best, &mut tests),
-            Top::Linear => {
-                let _ = all.into_iter().try_for_each(|number| self.count_one(number, &ray, any, &mut best, &mut tests));
-            }
-            Top::Tree { tree, unbounded } => {
-                let first = unbounded.iter();
-                let found =
-                    first.copied().try_for_each(|number| self.count_one(number, &ray, any, &mut best, &mut tests));
-                if found.is_continue() {
-                    let far = |best: &Hit| if best.t < ray.t_max { best.t } else { ray.t_max };
-                    let mut boxes = 0;
-                    let compared = |more| boxes += u64::from(more);
-                    let _ = tree.traverse_and_tell(&ray, ray.t_min, far(&best), compared, |number| {
-                        self.count_one(number, &ray, any, &mut best, &mut tests)?;
-                        ControlFlow::Continue(far(&best))
-                    });
-                    tests.boxes += boxes;
-                }
-            }
-        }
-        tests
-    }
-
-    /// [`meet`](Self::meet) with counts; breaks off where any hit will do and one was found.
-    fn count_one(
-        &self,
-        number: u32,
-        ray: &PreparedRay,
-        any: bool,
-        best: &mut Hit,
-        tests: &mut Tests,
-    ) -> ControlFlow<()> {
-        tests.boxes += 1;
-        let instance = &self.world.instances[number as usize];
-        let clip = instance.clip(ray);
-        if !(clip.is_empty() || clip.near > best.t || clip.near > ray.t_max || clip.far < ray.t_min) {
-            match instance.shape {
-                Shape::Mesh(mesh) => {
-                    let local = if instance.is_unmoved() { Some(*ray) } else { instance.local_ray(ray, clip) };
-                    if let Some(local) = local {
-                        self.meshes[mesh as usize].count(&local, any, best, tests);
-                    }
-                }
-                Shape::Quadric(quadric) => self.meet_quadric(quadric, number, ray, clip, None, best),
-            }
-        }
-        if any && best.is_hit() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
     /// The first hit strictly after `after` on wanted instances.
@@ -421,6 +363,63 @@ impl<A: TriangleAccelerator> Intersect for TwoLevel<A> {
 
     fn next_transmissive_after(&self, ray: &Ray, key: Key) -> Hit {
         PreparedRay::new(ray).map_or(Hit::MISS, |ray| self.search::<Transmissive>(&ray, Some(key)))
+    }
+}
+
+impl<A: Counting> TwoLevel<A> {
+    /// What the search for a ray's first hit, or for any, compares it with. Quadrics are not counted, but their boxes are.
+    pub fn count(&self, ray: &Ray, any: bool) -> Tests {
+        let (mut best, mut tests) = (Hit::MISS, Tests::default());
+        let Some(ray) = PreparedRay::new(ray) else { return tests };
+        let all = 0..self.world.instances.len() as u32;
+        match &self.top {
+            Top::Single => self.meshes[0].count(&ray, any, &mut best, &mut tests),
+            Top::Linear => {
+                let _ = all.into_iter().try_for_each(|number| self.count_one(number, &ray, any, &mut best, &mut tests));
+            }
+            Top::Tree { tree, unbounded } => {
+                let first = unbounded.iter();
+                let found =
+                    first.copied().try_for_each(|number| self.count_one(number, &ray, any, &mut best, &mut tests));
+                if found.is_continue() {
+                    let far = |best: &Hit| if best.t < ray.t_max { best.t } else { ray.t_max };
+                    let mut boxes = 0;
+                    let compared = |more| boxes += u64::from(more);
+                    let _ = tree.traverse_and_tell(&ray, ray.t_min, far(&best), compared, |number| {
+                        self.count_one(number, &ray, any, &mut best, &mut tests)?;
+                        ControlFlow::Continue(far(&best))
+                    });
+                    tests.boxes += boxes;
+                }
+            }
+        }
+        tests
+    }
+
+    /// [`meet`](Self::meet) with counts; breaks off where any hit will do and one was found.
+    fn count_one(
+        &self,
+        number: u32,
+        ray: &PreparedRay,
+        any: bool,
+        best: &mut Hit,
+        tests: &mut Tests,
+    ) -> ControlFlow<()> {
+        tests.boxes += 1;
+        let instance = &self.world.instances[number as usize];
+        let clip = instance.clip(ray);
+        if !(clip.is_empty() || clip.near > best.t || clip.near > ray.t_max || clip.far < ray.t_min) {
+            match instance.shape {
+                Shape::Mesh(mesh) => {
+                    let local = if instance.is_unmoved() { Some(*ray) } else { instance.local_ray(ray, clip) };
+                    if let Some(local) = local {
+                        self.meshes[mesh as usize].count(&local, any, best, tests);
+                    }
+                }
+                Shape::Quadric(quadric) => self.meet_quadric(quadric, number, ray, clip, None, best),
+            }
+        }
+        if any && best.is_hit() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 }
 

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::meshes::Random;
-use crate::accel::{Kind, Linear, Params, Preset, Tests, TreeStats, TriangleAccelerator, dispatch_kind};
+use crate::accel::{Counting, Kind, Linear, Params, Preset, Tests, TreeStats, TriangleAccelerator, dispatch_kind};
 use crate::geometry::ray::Interval;
 use crate::geometry::{Hit, Key, PreparedRay, Ray, TriangleMesh};
 use crate::math::random::hash2;
@@ -82,7 +82,7 @@ struct Answer {
 
 const INSTANCE: u32 = 7;
 
-fn answer<A: TriangleAccelerator>(accelerator: &A, ray: &PreparedRay) -> Answer {
+fn answer<A: Counting>(accelerator: &A, ray: &PreparedRay) -> Answer {
     let mut closest = Hit::MISS;
     accelerator.closest(ray, INSTANCE, &mut closest);
     let mut walk = Vec::new();
@@ -103,7 +103,7 @@ fn answer<A: TriangleAccelerator>(accelerator: &A, ray: &PreparedRay) -> Answer 
 }
 
 /// Searches that count must come to the same, and count what they need to get there.
-fn check_counts<A: TriangleAccelerator>(accelerator: &A, ray: &PreparedRay, closest: &Hit, occluded: bool) {
+fn check_counts<A: Counting>(accelerator: &A, ray: &PreparedRay, closest: &Hit, occluded: bool) {
     let mut counted = [(Hit::MISS, Tests::default()); 2];
     for (any, (hit, tests)) in counted.iter_mut().enumerate() {
         accelerator.count(ray, any == 1, hit, tests);
@@ -119,11 +119,7 @@ fn check_counts<A: TriangleAccelerator>(accelerator: &A, ray: &PreparedRay, clos
     assert!(occluded || all == few, "{}: {all:?} {few:?}", A::NAME);
 }
 
-fn answers<A: TriangleAccelerator>(
-    mesh: &TriangleMesh,
-    preset: Preset,
-    rays: &[PreparedRay],
-) -> (Vec<Answer>, TreeStats) {
+fn answers<A: Counting>(mesh: &TriangleMesh, preset: Preset, rays: &[PreparedRay]) -> (Vec<Answer>, TreeStats) {
     let params = Params { preset, ..Params::default() };
     let accelerator = A::build(mesh, &params, &Silent).unwrap();
     accelerator.validate().unwrap_or_else(|violation| panic!("{} {preset:?}: {violation}", A::NAME));

@@ -1,7 +1,7 @@
 //! A mesh's triangles cut into chunks that are built one by one, and the tree over the chunks.
 //!
-//! From the root down triangles are cut in two where the surface area heuristic, for a sample of them and at the borders of bins, is least
-//! (Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies", RT 2007), until a chunk is small enough to stay in a
+//! From the root down triangles are cut in two where the surface area heuristic, for a sample of them and at the borders of bins, is
+//! least (Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies", RT 2007), until a chunk is small enough to stay in a
 //! core's cache while it is built. Where the cuts lie depends on the triangles alone, not on the number of threads.
 
 use std::cmp::Ordering;
@@ -12,13 +12,14 @@ use rayon::prelude::*;
 
 use super::collapse::EVEN_DEPTH;
 use super::node::{Child, Node, WIDTH};
+use crate::accel::ONE_THREAD;
 use crate::accel::topology::half_area;
 use crate::geometry::triangle::hit_bounds;
 use crate::geometry::{Bounds, TriangleMesh};
 
 /// The most triangles of a chunk. Chunks of 4,096 make rays in Sponza cost up to 11 % more; with 65,536 a dragon of 871 k triangles is built
 /// as fast, within what was told apart, but less evenly on many threads.
-pub const MOST: usize = 1 << 14;
+pub const MOST: usize = ONE_THREAD;
 
 /// From this depth on triangles are cut in equal halves, so that the tree over 2^28 triangles' chunks stays less deep than
 /// [`EVEN_DEPTH`].

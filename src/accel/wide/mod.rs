@@ -22,7 +22,7 @@ use simd::{Closest, Level, NextAfter, Occluded};
 
 use super::leaf::{check_distinct, check_partition};
 use super::topology::half_area;
-use super::{Params, Tests, TreeStats, TriangleAccelerator};
+use super::{Counting, Params, Tests, TreeStats, TriangleAccelerator};
 use crate::error::{Error, Result};
 use crate::geometry::ray::Interval;
 use crate::geometry::{Bounds, Hit, Key, PreparedRay, Ray, TriangleMesh};
@@ -126,10 +126,6 @@ impl TriangleAccelerator for Wide {
         simd::occluded_batch(self.level, &self.tree, rays, clips, occluded);
     }
 
-    fn count(&self, ray: &PreparedRay, any: bool, best: &mut Hit, tests: &mut Tests) {
-        count::count(&self.tree, ray, any, best, tests);
-    }
-
     fn stats(&self) -> TreeStats {
         let area = half_area(&self.bounds);
         let relative = |bounds: &Bounds| if area > 0.0 { half_area(bounds) / area } else { 1.0 };
@@ -202,5 +198,11 @@ impl TriangleAccelerator for Wide {
 
     fn bounds(&self) -> Bounds {
         self.bounds
+    }
+}
+
+impl Counting for Wide {
+    fn count(&self, ray: &PreparedRay, any: bool, best: &mut Hit, tests: &mut Tests) {
+        count::count(&self.tree, ray, any, best, tests);
     }
 }

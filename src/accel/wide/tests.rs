@@ -221,30 +221,23 @@ fn trees_of_many_chunks_are_sound_and_the_same_on_any_number_of_threads() {
 #[test]
 fn a_build_of_many_chunks_can_be_stopped() {
     use std::sync::atomic::{AtomicU64, Ordering};
-    /// Says to stop once some triangles are done.
-    struct Stopping(AtomicU64);
+    /// Counts triangles and says to stop once more than so many are done.
+    struct Stopping(AtomicU64, u64);
     impl Progress for Stopping {
         fn advance(&self, steps: u64) {
             self.0.fetch_add(steps, Ordering::Relaxed);
         }
         fn is_cancelled(&self) -> bool {
-            self.0.load(Ordering::Relaxed) > 30_000
+            self.0.load(Ordering::Relaxed) > self.1
         }
     }
     let mesh = confetti(6 * chunks::MOST, 0.02, &mut Random::new(18, 0x51d));
-    let progress = Stopping(AtomicU64::new(0));
+    let progress = Stopping(AtomicU64::new(0), 30_000);
     assert!(Wide::build(&mesh, &Params::default(), &progress).is_err());
     assert!(progress.0.into_inner() < 60_000);
-    let counting = Counting(AtomicU64::new(0));
-    Wide::build(&mesh, &Params::default(), &counting).unwrap();
-    assert_eq!(counting.0.into_inner(), mesh.live_count() as u64);
-    /// Counts steps.
-    struct Counting(AtomicU64);
-    impl Progress for Counting {
-        fn advance(&self, steps: u64) {
-            self.0.fetch_add(steps, Ordering::Relaxed);
-        }
-    }
+    let progress = Stopping(AtomicU64::new(0), u64::MAX);
+    Wide::build(&mesh, &Params::default(), &progress).unwrap();
+    assert_eq!(progress.0.into_inner(), mesh.live_count() as u64);
 }
 
 #[test]

@@ -7,7 +7,7 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::accel::{Params, Tests, TreeStats, TriangleAccelerator};
+use crate::accel::{Params, TreeStats, TriangleAccelerator};
 use crate::error::Result;
 use crate::geometry::{Bounds, Hit, Key, PreparedRay, TriangleMesh, intersect_triangle};
 use crate::progress::{Progress, Share};
@@ -90,16 +90,6 @@ impl Loose {
         }
         false
     }
-
-    /// Every hit of a ray.
-    fn hits(&self, ray: &PreparedRay, instance: u32, mut each: impl FnMut(Hit)) {
-        self.visit(ray, |&Triangle { corners: [a, b, c], primitive }| {
-            if let Some(hit) = intersect_triangle(ray, a, b, c) {
-                each(Hit { t: hit.t, u: hit.u, v: hit.v, instance, primitive });
-            }
-            false
-        });
-    }
 }
 
 /// Whether a line crosses a node's box.
@@ -147,23 +137,14 @@ impl TriangleAccelerator for Loose {
     }
 
     fn next_after(&self, ray: &PreparedRay, instance: u32, key: Key, best: &mut Hit) {
-        self.hits(ray, instance, |hit| {
-            if key.is_before(&hit.key()) && hit.key().is_before(&best.key()) {
-                *best = hit;
-            }
-        });
-    }
-
-    fn count(&self, ray: &PreparedRay, any: bool, best: &mut Hit, tests: &mut Tests) {
-        // It is no contender, and its boxes are of no interest.
         self.visit(ray, |&Triangle { corners: [a, b, c], primitive }| {
-            tests.triangles += 1;
-            let hit = intersect_triangle(ray, a, b, c);
-            let hit = hit.map(|hit| Hit { t: hit.t, u: hit.u, v: hit.v, instance: 0, primitive });
-            if let Some(hit) = hit.filter(|hit| hit.key().is_before(&best.key())) {
-                *best = hit;
+            if let Some(hit) = intersect_triangle(ray, a, b, c) {
+                let hit = Hit { t: hit.t, u: hit.u, v: hit.v, instance, primitive };
+                if key.is_before(&hit.key()) && hit.key().is_before(&best.key()) {
+                    *best = hit;
+                }
             }
-            any && best.is_hit()
+            false
         });
     }
 

@@ -4,7 +4,7 @@ use std::cell::Cell;
 use std::mem::MaybeUninit;
 
 use super::packet::{Asked, Packet, RAYS};
-use super::single::{Closest, Flight, Kept, Occluded, Query};
+use super::single::{Closest, Flight, Occluded, Query};
 use super::{Lanes, Level, Portable, Rows, Set};
 use crate::accel::wide::Tree;
 use crate::geometry::ray::{AXES, Interval, largest_axis};
@@ -171,9 +171,9 @@ unsafe fn closest<L: Rows>(tree: &Tree, rays: &[Ray], clips: &[Interval], instan
             }
         }
         let best = Cell::from_mut(best).as_slice_of_cells();
-        let searches = scattered.iter().map(|at| (at, Kept { instance, best: best[at].get() }));
+        let searches = scattered.iter().map(|at| (at, Closest { instance, best: best[at].get() }));
         unsafe {
-            search_scattered::<L, Kept>(tree, rays, clips, searches, |at, query| best[at].set(query.best));
+            search_scattered::<L, Closest<Hit>>(tree, rays, clips, searches, |at, query| best[at].set(query.best));
         }
     }
 }

@@ -439,7 +439,7 @@ unsafe fn alone<L: Rows, const ANY: bool>(tree: &Tree, child: Child, packet: &mu
             } else {
                 let before = packet.best(lane);
                 let mut best = before;
-                walk_from::<L, Closest<'_>>(
+                walk_from::<L, Closest<&mut Hit>>(
                     tree,
                     child,
                     &ray,

@@ -1,5 +1,6 @@
 //! One ray through the tree.
 
+use std::borrow::BorrowMut;
 use std::mem::MaybeUninit;
 
 use super::super::collapse::MOST_DEPTH;
@@ -25,14 +26,14 @@ pub trait Query {
 }
 
 /// The first hit.
-pub struct Closest<'a> {
+pub struct Closest<B> {
     /// The number to put into hits.
     pub instance: u32,
-    /// The best so far.
-    pub best: &'a mut Hit,
+    /// The best so far, here or elsewhere.
+    pub best: B,
 }
 
-impl Query for Closest<'_> {
+impl<B: BorrowMut<Hit>> Query for Closest<B> {
     const NEAR_FIRST: bool = true;
 
     #[inline(always)]
@@ -42,50 +43,17 @@ impl Query for Closest<'_> {
 
     #[inline(always)]
     fn far(&self, ray: &PreparedRay) -> f32 {
-        ray.far_bound(self.best.t)
+        ray.far_bound(self.best.borrow().t)
     }
 
     #[inline(always)]
     fn offer(&mut self, hit: TriangleHit, primitive: u32) -> bool {
         let hit = Hit { t: hit.t, u: hit.u, v: hit.v, instance: self.instance, primitive };
-        if hit.key().is_before(&self.best.key()) {
-            *self.best = hit;
+        let best = self.best.borrow_mut();
+        if hit.key().is_before(&best.key()) {
+            *best = hit;
         }
         false
-    }
-}
-
-/// The first hit, kept here.
-pub struct Kept {
-    /// The number to put into hits.
-    pub instance: u32,
-    /// The best so far.
-    pub best: Hit,
-}
-
-impl Kept {
-    #[inline(always)]
-    fn closest(&mut self) -> Closest<'_> {
-        Closest { instance: self.instance, best: &mut self.best }
-    }
-}
-
-impl Query for Kept {
-    const NEAR_FIRST: bool = Closest::NEAR_FIRST;
-
-    #[inline(always)]
-    fn near(&self, ray: &PreparedRay) -> f32 {
-        ray.lower_bound(ray.t_min)
-    }
-
-    #[inline(always)]
-    fn far(&self, ray: &PreparedRay) -> f32 {
-        ray.far_bound(self.best.t)
-    }
-
-    #[inline(always)]
-    fn offer(&mut self, hit: TriangleHit, primitive: u32) -> bool {
-        self.closest().offer(hit, primitive)
     }
 }
 
@@ -94,7 +62,7 @@ pub struct NextAfter<'a> {
     /// What comes before the hit.
     pub key: Key,
     /// The search among the others.
-    pub closest: Closest<'a>,
+    pub closest: Closest<&'a mut Hit>,
 }
 
 impl Query for NextAfter<'_> {
