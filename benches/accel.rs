@@ -2,6 +2,8 @@
 //!
 //! `cargo bench --bench accel`. Trees must agree on every ray, and with `linear` on some, before anything is timed.
 
+use std::sync::Arc;
+
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use glam::{Vec2, Vec3};
 use whitted::accel::{Kind, Linear, Params, Preset, TriangleAccelerator, dispatch_kind};
@@ -80,7 +82,7 @@ fn occluded<A: TriangleAccelerator>(accelerator: &A, rays: &[Ray]) -> Vec<bool> 
 }
 
 fn bench(criterion: &mut Criterion) {
-    for mesh in [sphere(), terrain()] {
+    for mesh in [sphere(), terrain()].map(Arc::new) {
         let ray_sets = [("primary", primary()), ("scattered", scattered(&mesh))];
         let linear = Linear::build(&mesh, &Params::default(), &Silent).expect("nothing cancels");
         let expected = ray_sets.each_ref().map(|(_, rays)| closest(&linear, &rays[..64]));

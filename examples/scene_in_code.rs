@@ -59,7 +59,7 @@ fn scene() -> whitted::Result<Scene> {
             material("red", Rgb::new(0.75, 0.08, 0.05), 0.0),
         ],
         textures: vec![checker()],
-        meshes: vec![triangle()?],
+        meshes: vec![triangle()?.into()],
         quadrics: vec![shapes::plane(Some(8.0)), shapes::sphere()],
         objects: vec![
             object("floor", Shape::Quadric(0), DVec3::ZERO, 0),

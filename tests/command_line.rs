@@ -276,6 +276,7 @@ fn threads_and_accelerators_do_not_change_a_byte() {
         "--threads 1 --accelerator bvh2",
         "--threads 2 --accelerator bvh2 --preset best",
         "--threads 2 --accelerator cwbvh --preset fast",
+        "--accelerator compact",
         "--accelerator auto",
     ] {
         assert!(workshop.png(&format!("--size 40x30 --spp 2 {flags}")) == reference, "{flags}");
@@ -550,6 +551,11 @@ fn the_statistics_of_a_rendering_are_stable() {
     assert_eq!(json["rays"]["camera"], 8 * 6 * 3);
     assert_eq!(json["settings"]["threads"], 2);
     assert_eq!(json["bytes"]["film"], 8 * 6 * 12);
+    let seconds = |name: &str| json["thread_seconds"][name].as_f64().unwrap();
+    assert!(seconds("traversal") > 0.0 && seconds("shading") > 0.0);
+    let all = seconds("traversal") + seconds("shading") + seconds("rest");
+    assert!(all <= 2.0 * json["seconds"]["render"].as_f64().unwrap() + 1e-9);
+    assert_eq!(json["settings"]["accelerator"], "wide");
     #[cfg(target_os = "linux")]
     assert!(json["bytes"]["peak_resident"].as_u64().unwrap() > 1 << 20);
     assert_documented(
@@ -584,11 +590,16 @@ fn the_statistics_of_a_rendering_are_stable() {
             "rays.reflected",
             "rays.refracted",
             "rays.total",
+            "rays_per_second",
             "seconds",
             "seconds.load",
             "seconds.build",
             "seconds.render",
             "seconds.write",
+            "thread_seconds",
+            "thread_seconds.traversal",
+            "thread_seconds.shading",
+            "thread_seconds.rest",
             "bytes",
             "bytes.geometry",
             "bytes.textures",
@@ -599,6 +610,52 @@ fn the_statistics_of_a_rendering_are_stable() {
             "bytes.peak_resident",
         ],
     );
+}
+
+#[test]
+fn a_limit_of_memory_chooses_the_compact_structure_or_refuses() {
+    use std::fmt::Write;
+    let workshop = Workshop::new();
+    const SIDE: u64 = 50;
+    let mut hills = String::new();
+    for (x, z) in (0..=SIDE).flat_map(|z| (0..=SIDE).map(move |x| (x, z))) {
+        writeln!(hills, "v {x} {} {z}", x * z % 7).unwrap();
+    }
+    for (x, z) in (0..SIDE).flat_map(|z| (0..SIDE).map(move |x| (x, z))) {
+        let corner = z * (SIDE + 1) + x + 1;
+        writeln!(hills, "f {} {} {} {}", corner, corner + SIDE + 1, corner + SIDE + 2, corner + 1).unwrap();
+    }
+    workshop.write("hills.obj", &hills);
+    let render = |flags: &str| {
+        workshop
+            .succeed(&format!("render hills.obj --size 20x10 --spp 1 -o hills.png --stats-json stats.json {flags}"));
+        let json: Value = serde_json::from_slice(&fs::read(workshop.path("stats.json")).unwrap()).unwrap();
+        (json, fs::read(workshop.path("hills.png")).unwrap())
+    };
+    let (json, picture) = render("");
+    assert_eq!(json["settings"]["accelerator"], "wide");
+    let (json, same) = render("--memory-limit 2G");
+    assert_eq!(json["settings"]["accelerator"], "wide");
+    assert!(same == picture);
+    // Between what the two take while they are built.
+    let triangles = 2 * SIDE * SIDE;
+    let others = json["bytes"]["geometry"].as_u64().unwrap() + 32 * 20 * 10;
+    let limit = others + triangles * (36 + 512 + 35);
+    let (json, same) = render(&format!("--memory-limit {limit}"));
+    assert_eq!(json["settings"]["accelerator"], "compact");
+    assert!(json["bytes"]["tree_leaves"].as_u64().unwrap() < 5 * triangles);
+    assert!(same == picture);
+    // Without a size the picture is larger.
+    let limit = limit + 32 * (1280 * 720 - 20 * 10);
+    let info: Value =
+        serde_json::from_slice(&workshop.succeed(&format!("info hills.obj --tree --json --memory-limit {limit}")))
+            .unwrap();
+    assert_eq!(info["tree"]["accelerator"], "compact");
+    assert!(info["tree"]["bytes_per_triangle"].as_f64().unwrap() < 24.0);
+    let refused = workshop.fail("render hills.obj --memory-limit 1M");
+    assert!(refused.contains("MiB") && refused.contains("raise the limit"), "{refused}");
+    let both = workshop.run("render hills.obj --memory-limit 1M --accelerator wide");
+    assert_eq!(both.status.code(), Some(2), "{}", text(&both.stderr));
 }
 
 #[test]

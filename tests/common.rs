@@ -36,7 +36,7 @@ pub fn add_quadric(scene: &mut Scene, quadric: Quadric, transform: DAffine3, mat
 /// Adds a mesh with a material of its own.
 pub fn add_mesh(scene: &mut Scene, mesh: TriangleMesh, transform: DAffine3, material: Material) {
     let shape = Shape::Mesh(scene.meshes.len() as u32);
-    scene.meshes.push(mesh.finish().unwrap());
+    scene.meshes.push(mesh.finish().unwrap().into());
     add_object(scene, shape, transform, material);
 }
 

@@ -1,6 +1,8 @@
-//! How much memory building the default structure takes at its peak, beside the mesh: measured, on Linux, in a process of its own.
+//! How much memory building the default structure and the compact one takes at its peak, beside the mesh: measured, on Linux, in a process of its own.
 
-use whitted::accel::{Params, TriangleAccelerator, Wide};
+use std::sync::Arc;
+
+use whitted::accel::{Compact, Params, TriangleAccelerator, Wide};
 use whitted::geometry::TriangleMesh;
 use whitted::glam::Vec3;
 use whitted::progress::Silent;
@@ -31,14 +33,14 @@ fn status(name: &str) -> Option<u64> {
 }
 
 /// Bytes a triangle that a build adds to what is resident, at its peak and in the end.
-fn peak_and_end(side: u32) -> Option<(f64, f64)> {
-    let mesh = hills(side);
+fn peak_and_end<A: TriangleAccelerator>(side: u32) -> Option<(f64, f64)> {
+    let mesh = Arc::new(hills(side));
     // Forget the peak so far.
     std::fs::write("/proc/self/clear_refs", "5").ok()?;
     let before = status("VmRSS")?;
-    let wide = Wide::build(&mesh, &Params::default(), &Silent).unwrap();
+    let built = A::build(&mesh, &Params::default(), &Silent).unwrap();
     let peak = status("VmHWM")?;
-    let stats = wide.stats();
+    let stats = built.stats();
     let triangles = mesh.live_count() as f64;
     Some((peak.saturating_sub(before) as f64 / triangles, (stats.node_bytes + stats.leaf_bytes) as f64 / triangles))
 }
@@ -48,20 +50,24 @@ fn peak_and_end(side: u32) -> Option<(f64, f64)> {
 #[ignore = "asked for by the test below, in a process of its own"]
 fn alone() {
     let side = std::env::var(SIDE).unwrap().parse().unwrap();
-    match peak_and_end(side) {
+    let kind = std::env::var(KIND).unwrap();
+    let measured = if kind == Compact::NAME { peak_and_end::<Compact>(side) } else { peak_and_end::<Wide>(side) };
+    match measured {
         Some((peak, end)) => println!("{PREFIX}{peak} {end}"),
         None => println!("{PREFIX}"),
     }
 }
 
 const SIDE: &str = "WHITTED_TEST_SIDE";
+const KIND: &str = "WHITTED_TEST_KIND";
 const PREFIX: &str = "peak and end: ";
 
 /// The peak is the tree, 32 bytes for boxes and numbers while it is built, and a chunk a thread, for which there is a margin.
-fn check(side: u32) {
+fn check<A: TriangleAccelerator>(side: u32, limit: f64) {
     let output = std::process::Command::new(std::env::current_exe().unwrap())
         .args(["memory::alone", "--exact", "--ignored", "--nocapture"])
         .env(SIDE, side.to_string())
+        .env(KIND, A::NAME)
         .env("RAYON_NUM_THREADS", "2")
         .output()
         .unwrap();
@@ -72,9 +78,9 @@ fn check(side: u32) {
         eprintln!("skipped: this system does not tell how much memory a process takes");
         return;
     };
-    println!("{} triangles: {end:.1} bytes each in the end, {peak:.1} at the peak", 2 * side * side);
+    println!("{}, {} triangles: {end:.1} bytes each in the end, {peak:.1} at the peak", A::NAME, 2 * side * side);
     let margin = 48.0 * f64::from(1 << 20) / f64::from(2 * side * side);
-    assert!(end < 64.0, "{end} bytes a triangle");
+    assert!(end < limit, "{end} bytes a triangle");
     // Debug builds audit the tree as well, on a copy of its triangles.
     let audit = if cfg!(debug_assertions) { 48.0 } else { 0.0 };
     assert!(peak < end + 36.0 + margin + audit, "{peak} bytes a triangle at the peak, {end} in the end");
@@ -82,9 +88,13 @@ fn check(side: u32) {
 
 #[test]
 fn a_build_takes_little_more_than_what_it_makes() {
-    check(724);
+    let both = |side: u32| {
+        check::<Wide>(side, 64.0);
+        check::<Compact>(side, 24.0);
+    };
+    both(724);
     if std::env::var_os("WHITTED_FULL_TESTS").is_some() {
-        check(2237);
+        both(2237);
     } else {
         eprintln!("skipped: 10 million triangles; set WHITTED_FULL_TESTS for them");
     }

@@ -1,5 +1,7 @@
 //! Every triangle for every ray: the reference that trees are compared with.
 
+use std::sync::Arc;
+
 use super::leaf::{LeafTriangle, check_distinct};
 use super::{Counting, Params, Tests, TreeStats, TriangleAccelerator};
 use crate::error::Result;
@@ -15,7 +17,7 @@ pub struct Linear {
 impl TriangleAccelerator for Linear {
     const NAME: &'static str = "linear";
 
-    fn build(mesh: &TriangleMesh, _params: &Params, progress: &dyn Progress) -> Result<Self> {
+    fn build(mesh: &Arc<TriangleMesh>, _params: &Params, progress: &dyn Progress) -> Result<Self> {
         let mut share = Share::new(progress, mesh.live_count() as u64);
         let triangles: Vec<_> = mesh.live_triangles().map(|number| LeafTriangle::new(mesh, number)).collect();
         share.reach(100)?;

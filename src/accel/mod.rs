@@ -5,7 +5,7 @@
 //! boxes -> Topology (ploc) -> PairTree -> Bvh2     (triangles of one mesh)
 //!                          |          `-> BoxTree  (instances)
 //!                          |-> CwBvh               (triangles of one mesh)
-//!                          `-> Wide                (triangles of one mesh, SIMD chosen at run time)
+//!                          `-> Wide, Compact       (triangles of one mesh, SIMD chosen at run time)
 //! ```
 //!
 //! Why trees cannot disagree: a hit's t lies within the interval in which the ray crosses the triangle's own box, and
@@ -16,6 +16,7 @@
 //! To add a structure, write its file and add its line to [`for_each_accelerator!`](crate::for_each_accelerator).
 
 mod box_tree;
+mod budget;
 mod bvh2;
 mod cwbvh;
 mod leaf;
@@ -38,7 +39,9 @@ pub use stats::{Tests, TreeStats};
 /// For `measure`, which compares formulas within one and the same tree.
 #[cfg(feature = "measure")]
 pub(crate) use topology::{Node, Topology};
-pub use wide::Wide;
+pub use wide::{Compact, Wide};
+
+use std::sync::Arc;
 
 use crate::error::Result;
 use crate::geometry::ray::Interval;
@@ -55,8 +58,9 @@ macro_rules! for_each_accelerator {
             { $($arguments)* }
             Linear "linear" "Every triangle, no tree: the reference.";
             Bvh2 "bvh2" "Binary tree.";
-            CwBvh "cwbvh" "Compressed 8-wide tree: the least memory.";
+            CwBvh "cwbvh" "Compressed 8-wide tree.";
             Wide "wide" "8-wide tree searched with SIMD: the fastest.";
+            Compact "compact" "The same with leaves that refer to the mesh: the least memory.";
         }
     };
 }
@@ -172,12 +176,12 @@ pub trait TriangleAccelerator: Sized + Send + Sync {
     /// What the structure is called on the command line and in reports.
     const NAME: &'static str;
 
-    /// Builds the structure over the mesh's live triangles, each of which is a step of `progress`. The mesh is not needed
-    /// afterwards.
+    /// Builds the structure over the mesh's live triangles, each of which is a step of `progress`. Structures that do not have
+    /// copies of the triangles share the mesh.
     ///
     /// # Errors
     /// When `progress` says to stop.
-    fn build(mesh: &TriangleMesh, params: &Params, progress: &dyn Progress) -> Result<Self>;
+    fn build(mesh: &Arc<TriangleMesh>, params: &Params, progress: &dyn Progress) -> Result<Self>;
 
     /// Replaces `best` by the ray's first hit in the order of [`Key`]s if that comes before it.
     ///

@@ -1,6 +1,7 @@
 //! What all trees with triangles in their leaves share: how they are built, and the three questions asked of them.
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 use super::leaf::{LeafTriangle, check_distinct};
 use super::topology::Topology;
@@ -53,7 +54,7 @@ pub trait TriangleTree: Sized + Send + Sync {
 impl<T: TriangleTree> TriangleAccelerator for T {
     const NAME: &'static str = <T as TriangleTree>::NAME;
 
-    fn build(mesh: &TriangleMesh, params: &Params, progress: &dyn Progress) -> Result<Self> {
+    fn build(mesh: &Arc<TriangleMesh>, params: &Params, progress: &dyn Progress) -> Result<Self> {
         progress.check()?;
         let mut share = Share::new(progress, mesh.live_count() as u64);
         let live: Vec<u32> = mesh.live_triangles().collect();

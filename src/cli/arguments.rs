@@ -8,16 +8,18 @@ use clap_complete::Shell;
 use super::bench::BenchArguments;
 use super::check::CheckArguments;
 use super::diff::DiffArguments;
+use super::memory_limit::kind_within;
 use super::precision::Precision;
 use super::query::QueryArguments;
 use super::report::ReportArguments;
 use super::values::{self, Orbit, one_of};
 use crate::accel::{Kind, Params, Preset};
+use crate::error::Result;
 use crate::formats::{LoadOptions, NormalMode, UpAxis};
 use crate::render::{AovKind, Crop, RenderSettings};
 use crate::scene::auto::View;
 use crate::scene::film::{LARGEST_DEPTH, MOST_SAMPLES};
-use crate::scene::{Clamp, FilmSettings, Transfer};
+use crate::scene::{Clamp, FilmSettings, Scene, Transfer};
 
 /// Far more threads than any machine has processors.
 pub const MOST_THREADS: u32 = 4096;
@@ -169,6 +171,10 @@ pub struct BuildArguments {
     /// Acceleration structure for triangles.
     #[arg(long, value_name = "KIND", value_parser = one_of(accelerators()), default_value = "auto")]
     pub accelerator: Kind,
+    /// The most memory that scene, structures and picture together may take, such as 800M or 4G: where the fastest structure would
+    /// take more, the compact one is built.
+    #[arg(long, value_name = "SIZE", value_parser = values::bytes, conflicts_with = "accelerator")]
+    pub memory_limit: Option<u64>,
     /// How much time its build may take for faster rays.
     #[arg(long, value_name = "PRESET", value_parser = one_of(PRESETS), default_value = "balanced")]
     pub preset: Preset,
@@ -249,9 +255,16 @@ impl LoadArguments {
 }
 
 impl BuildArguments {
-    /// As the builders take them.
-    pub fn params(&self) -> Params {
-        Params { kind: self.accelerator, preset: self.preset }
+    /// As the builders take them, for a scene.
+    ///
+    /// # Errors
+    /// When nothing fits the limit of memory.
+    pub fn params(&self, scene: &Scene) -> Result<Params> {
+        let kind = match self.memory_limit {
+            Some(limit) => kind_within(limit, scene)?,
+            None => self.accelerator,
+        };
+        Ok(Params { kind, preset: self.preset })
     }
 }
 
@@ -268,7 +281,7 @@ mod tests {
     use super::*;
     use clap::CommandFactory;
 
-    fn render(flags: &str) -> Result<Box<RenderArguments>, clap::Error> {
+    fn render(flags: &str) -> std::result::Result<Box<RenderArguments>, clap::Error> {
         let words = ["whitted", "render", "in.obj"].into_iter().chain(flags.split_whitespace());
         Arguments::try_parse_from(words).map(|arguments| match arguments.command {
             Command::Render(render) => render,

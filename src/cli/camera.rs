@@ -113,7 +113,8 @@ mod tests {
             TriangleMesh { positions: positions.to_vec(), indices: vec![[0, 1, 2], [0, 2, 3]], ..Default::default() };
         let object =
             Object { name: String::new(), shape: Shape::Mesh(0), transform: glam::DAffine3::IDENTITY, material: None };
-        let mut scene = Scene { meshes: vec![mesh.finish().unwrap()], objects: vec![object], ..Default::default() };
+        let mut scene =
+            Scene { meshes: vec![mesh.finish().unwrap().into()], objects: vec![object], ..Default::default() };
         let automatic = auto::complete(&mut scene);
         (scene, automatic)
     }

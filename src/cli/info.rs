@@ -152,7 +152,7 @@ pub fn run(arguments: &InfoArguments) -> Result<()> {
     ledger::report(&ledger, false);
     let mut info = Info::of(&arguments.input, &scene, &ledger);
     if arguments.tree || arguments.validate {
-        let renderer = Renderer::build(scene, &arguments.build.params(), &terminal);
+        let renderer = arguments.build.params(&scene).and_then(|params| Renderer::build(scene, &params, &terminal));
         terminal.clear();
         info.tree = Some(Tree::of(&renderer?, arguments)?);
     }
@@ -174,7 +174,7 @@ impl<'a> Info<'a> {
             dropped.bad_index += counts.bad_index;
         }
         let bytes = Bytes::of(scene);
-        let all_triangles = scene.meshes.iter().map(TriangleMesh::triangle_count).sum();
+        let all_triangles = scene.meshes.iter().map(|mesh| mesh.triangle_count()).sum();
         let texture = |texture: &crate::scene::Texture| TextureInfo {
             name: seen_from(input, &texture.name),
             width: texture.width,
@@ -316,7 +316,7 @@ mod tests {
         };
         let object = |shape, transform| Object { name: String::new(), shape, transform, material: Some(0) };
         let mut scene = Scene {
-            meshes: vec![mesh.finish().unwrap()],
+            meshes: vec![mesh.finish().unwrap().into()],
             quadrics: vec![shapes::sphere()],
             objects: vec![
                 object(Shape::Mesh(0), DAffine3::IDENTITY),

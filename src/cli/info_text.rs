@@ -179,7 +179,7 @@ fn short(x: f64) -> f64 {
 }
 
 /// A number of bytes with a unit of 1024s, to four digits.
-fn readable(bytes: u64) -> String {
+pub fn readable(bytes: u64) -> String {
     const UNITS: [&str; 5] = ["B", "KiB", "MiB", "GiB", "TiB"];
     let mut value = bytes as f64;
     let mut unit = 0;

@@ -15,6 +15,7 @@ mod diff;
 mod info;
 mod info_text;
 mod ledger;
+mod memory_limit;
 mod outputs;
 mod precision;
 mod query;

@@ -211,7 +211,10 @@ enum Answerer {
 impl Answerer {
     fn build(scene: Scene, arguments: &QueryArguments, progress: &dyn Progress) -> Result<Self> {
         match arguments.precision {
-            Precision::F32 => Ok(Self::F32(Box::new(Renderer::build(scene, &arguments.build.params(), progress)?))),
+            Precision::F32 => {
+                let params = arguments.build.params(&scene)?;
+                Ok(Self::F32(Box::new(Renderer::build(scene, &params, progress)?)))
+            }
             Precision::Exact => {
                 let oracle = Box::new(Oracle::new(&scene)?);
                 Ok(Self::Exact(Box::new(scene), oracle))

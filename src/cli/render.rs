@@ -56,9 +56,9 @@ pub fn run(arguments: &RenderArguments) -> Result<()> {
         formats::scene_file::save_model_scene(&scene, &arguments.input, &options, path)?;
     }
 
+    let params = arguments.build.params(&scene)?;
     let renderer;
-    (renderer, seconds.build) =
-        timed(|| AnyRenderer::build(scene, arguments.precision, &arguments.build.params(), &terminal));
+    (renderer, seconds.build) = timed(|| AnyRenderer::build(scene, arguments.precision, &params, &terminal));
     terminal.clear();
     let renderer = renderer?;
     report_time("build", seconds.build);
@@ -99,7 +99,9 @@ pub fn run(arguments: &RenderArguments) -> Result<()> {
                 threads: film.stats.threads,
             },
             rays: film.stats.rays.into(),
+            rays_per_second: film.stats.rays.total() as f64 / seconds.render.max(f64::MIN_POSITIVE),
             seconds,
+            thread_seconds: film.stats.thread_seconds,
             bytes: Bytes::of(scene, build, &film),
         };
         let text = serde_json::to_string_pretty(&stats).expect("names and numbers have a JSON form");

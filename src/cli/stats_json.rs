@@ -8,7 +8,7 @@ use serde::{Serialize, Serializer};
 
 use super::precision::Precision;
 use crate::accel::Preset;
-use crate::render::{AovKind, BuildStats, Crop, Film, RayCounts};
+use crate::render::{AovKind, BuildStats, Crop, Film, RayCounts, ThreadSeconds};
 use crate::scene::{FilmSettings, Scene};
 
 /// Version of the documents that `--json` and `--stats-json` write.
@@ -46,8 +46,12 @@ pub struct Stats<'a> {
     pub settings: Settings<'a>,
     /// Rays by kind.
     pub rays: Rays,
+    /// All rays through the time of rendering.
+    pub rays_per_second: f64,
     /// Wall-clock seconds by stage.
     pub seconds: Seconds,
+    /// What the rendering's threads did with their time.
+    pub thread_seconds: ThreadSeconds,
     /// Bytes by part.
     pub bytes: Bytes,
 }
@@ -118,8 +122,8 @@ impl Bytes {
     /// Adds up what a picture took.
     pub fn of(scene: &Scene, build: &BuildStats, film: &Film) -> Self {
         Self {
-            geometry: scene.meshes.iter().map(|mesh| mesh.bytes() as u64).sum(),
-            textures: scene.textures.iter().map(|texture| texture.bytes() as u64).sum(),
+            geometry: geometry_bytes(scene),
+            textures: texture_bytes(scene),
             tree_nodes: build.node_bytes,
             tree_leaves: build.leaf_bytes,
             top_level: build.top_level_bytes,
@@ -134,6 +138,16 @@ pub fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
     let start = Instant::now();
     let value = work();
     (value, start.elapsed().as_secs_f64())
+}
+
+/// Bytes of a scene's meshes.
+pub fn geometry_bytes(scene: &Scene) -> u64 {
+    scene.meshes.iter().map(|mesh| mesh.bytes() as u64).sum()
+}
+
+/// Bytes of its images.
+pub fn texture_bytes(scene: &Scene) -> u64 {
+    scene.textures.iter().map(|texture| texture.bytes() as u64).sum()
 }
 
 fn film_bytes(film: &Film) -> u64 {

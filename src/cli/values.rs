@@ -77,6 +77,24 @@ pub fn exposure(text: &str) -> Result<f32, String> {
     }
 }
 
+/// Reads a number of bytes: `800M`, `1.5GiB`; a unit is 1024 of the one before.
+pub fn bytes(text: &str) -> Result<u64, String> {
+    let expected = || "expected a number and a unit, such as 800M or 4G".to_owned();
+    let digits = text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len());
+    let (number, unit) = text.split_at(digits);
+    let shift = match unit.to_ascii_lowercase().trim_end_matches('b').trim_end_matches('i') {
+        "" => 0,
+        "k" => 10,
+        "m" => 20,
+        "g" => 30,
+        "t" => 40,
+        _ => return Err(expected()),
+    };
+    let number: f64 = number.trim_end().parse().map_err(|_| expected())?;
+    let bytes = number * (1u64 << shift) as f64;
+    if (1.0..=9e18).contains(&bytes) { Ok(bytes as u64) } else { Err(expected()) }
+}
+
 /// Reads a whole number within a range.
 pub fn count(range: RangeInclusive<u32>) -> impl TypedValueParser<Value = u32> {
     clap::value_parser!(u32).range(i64::from(*range.start())..=i64::from(*range.end()))
@@ -101,6 +119,18 @@ mod tests {
         }
         for bad in ["0x5", "5x0", "65537x1"] {
             assert!(size(bad).unwrap_err().contains("between 1 and 65536"), "{bad}");
+        }
+    }
+
+    #[test]
+    fn bytes_are_read_with_and_without_units() {
+        for (text, expected) in
+            [("1", 1), ("4096", 4096), ("800M", 800 << 20), ("1.5GiB", 3 << 29), ("2kb", 2048), ("3 T", 3 << 40)]
+        {
+            assert_eq!(bytes(text), Ok(expected), "{text}");
+        }
+        for bad in ["", "M", "-1G", "0", "1X", "1e30", "nan", "4 G B", "inf"] {
+            assert!(bytes(bad).unwrap_err().contains("800M"), "{bad}");
         }
     }
 

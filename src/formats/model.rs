@@ -1,5 +1,7 @@
 //! What a model file holds, and how it becomes part of a scene.
 
+use std::sync::Arc;
+
 use glam::{DAffine3, DVec3};
 
 use crate::formats::Ledger;
@@ -70,7 +72,7 @@ impl Model {
                 Materials::One(material) => *material += first_material,
                 Materials::PerTriangle(materials) => materials.iter_mut().for_each(|m| *m += first_material),
             }
-            mesh
+            Arc::new(mesh)
         }));
         let objects = self.objects.into_iter().map(|mut object| {
             if let Shape::Mesh(mesh) = &mut object.shape {

@@ -47,7 +47,7 @@ pub fn mesh_at(positions: &[DVec3], indices: Vec<[u32; 3]>) -> Result<TriangleMe
 /// Adds a finished mesh with a material of its own; gives its instance number.
 pub fn add_mesh(scene: &mut Scene, mesh: TriangleMesh, transform: DAffine3, material: Material) -> u32 {
     let shape = Shape::Mesh(scene.meshes.len() as u32);
-    scene.meshes.push(mesh);
+    scene.meshes.push(mesh.into());
     add_object(scene, shape, transform, material)
 }
 

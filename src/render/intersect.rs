@@ -2,6 +2,7 @@
 //! unbounded quadrics beside it. Here accelerators and scenes meet.
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
@@ -123,7 +124,7 @@ impl<A: TriangleAccelerator> TwoLevel<A> {
         let world = World::new(scene)?;
         let instances = &world.instances;
         // Small meshes side by side; what is large is built on all threads by itself, one after the other for the sake of memory.
-        let build = |mesh: &TriangleMesh| A::build(mesh, params, progress);
+        let build = |mesh: &Arc<TriangleMesh>| A::build(mesh, params, progress);
         let is_small = |mesh: &TriangleMesh| mesh.live_count() <= accel::ONE_THREAD;
         let small = scene.meshes.par_iter().map(|mesh| is_small(mesh).then(|| build(mesh)).transpose());
         let small = small.collect::<Result<Vec<_>>>()?;
@@ -442,7 +443,7 @@ mod tests {
                 })
                 .collect();
             let indices = (0..count as u32).map(|n| [3 * n, 3 * n + 1, 3 * n + 2]).collect();
-            TriangleMesh { positions, indices, ..TriangleMesh::default() }.finish().unwrap()
+            TriangleMesh { positions, indices, ..TriangleMesh::default() }.finish().unwrap().into()
         };
         let meshes: Vec<_> = [50_000, 10, 40_000, 1, 40_000, 300, 60_000].into_iter().map(&mut confetti).collect();
         let object = |mesh: u32| Object {

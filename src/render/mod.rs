@@ -28,4 +28,4 @@ pub use answers::Answers;
 pub use film::{Aov, AovKind, Film};
 pub use intersect::Intersect;
 pub use renderer::{BuildStats, Renderer};
-pub use settings::{Crop, RayCounts, RenderSettings, RenderStats};
+pub use settings::{Crop, RayCounts, RenderSettings, RenderStats, ThreadSeconds};

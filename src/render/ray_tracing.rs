@@ -9,7 +9,7 @@ use crate::progress::Progress;
 use crate::render::answers::Answers;
 use crate::render::film::{Aov, AovKind, Film};
 use crate::render::sampling::{Positions, position};
-use crate::render::settings::{Crop, RayCounts, RenderSettings, RenderStats};
+use crate::render::settings::{Crop, RayCounts, RenderSettings, RenderStats, ThreadSeconds};
 use crate::render::surface::SurfacePoint;
 use crate::render::trace::Tracer;
 use crate::render::wave::LARGEST;
@@ -34,6 +34,7 @@ struct Tile {
     alpha: Vec<f32>,
     aovs: Vec<Vec<f32>>,
     counts: RayCounts,
+    seconds: ThreadSeconds,
 }
 
 /// Renders the scene through its active camera into a film.
@@ -99,12 +100,15 @@ pub fn ray_tracing<I: Answers>(
             .collect(),
         settings: *film,
         complete: finished.iter().all(Option::is_some),
-        stats: RenderStats { rays: RayCounts::default(), seconds, threads: pool.current_num_threads() },
+        stats: RenderStats { seconds, threads: pool.current_num_threads(), ..RenderStats::default() },
     };
     for tile in finished.into_iter().flatten() {
         picture.stats.rays += tile.counts;
+        picture.stats.thread_seconds += tile.seconds;
         copy_tile(&mut picture, area, &tile);
     }
+    let ThreadSeconds { traversal, shading, rest } = &mut picture.stats.thread_seconds;
+    *rest = (seconds * picture.stats.threads as f64 - *traversal - *shading).max(0.0);
     Ok(picture)
 }
 
@@ -141,6 +145,7 @@ fn tile_pixels<I: Answers>(
         alpha: Vec::new(),
         aovs: vec![vec![0.0; pixels]; channels],
         counts: RayCounts::default(),
+        seconds: ThreadSeconds::default(),
     };
     let samples = tracer.scene.film.samples;
     let transparent = tracer.scene.background == Background::Transparent;
@@ -169,6 +174,7 @@ fn tile_pixels<I: Answers>(
         });
     }
     tile.counts = tracer.counts();
+    tile.seconds = tracer.seconds();
     Some(tile)
 }
 

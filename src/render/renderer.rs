@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use crate::accel::{Bvh2, CwBvh, Linear, Params, Tests, Wide};
+use crate::accel::{Bvh2, Compact, CwBvh, Linear, Params, Tests, Wide};
 use crate::error::Result;
 use crate::geometry::{Hit, Key, Ray};
 use crate::progress::Progress;

@@ -55,6 +55,26 @@ impl std::ops::AddAssign for RayCounts {
     }
 }
 
+/// What threads did with their time, in seconds, all threads together.
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
+pub struct ThreadSeconds {
+    /// Finding what rays hit, and whether lights are seen.
+    pub traversal: f64,
+    /// Finding surface points and colours, and making the rays that leave them. Light that passes through transparent surfaces is
+    /// followed here.
+    pub shading: f64,
+    /// The rest: sample positions, camera rays, sums over pixels, and waiting for the last tiles.
+    pub rest: f64,
+}
+
+impl std::ops::AddAssign for ThreadSeconds {
+    fn add_assign(&mut self, other: Self) {
+        self.traversal += other.traversal;
+        self.shading += other.shading;
+        self.rest += other.rest;
+    }
+}
+
 /// What a rendering took.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
 pub struct RenderStats {
@@ -62,6 +82,8 @@ pub struct RenderStats {
     pub rays: RayCounts,
     /// Wall-clock seconds from the first camera ray to the finished linear film.
     pub seconds: f64,
+    /// The same for each thread, by what was done.
+    pub thread_seconds: ThreadSeconds,
     /// Threads that were used.
     pub threads: usize,
 }

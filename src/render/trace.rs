@@ -1,13 +1,14 @@
 //! `Trace`: what a ray sees.
 
 use std::cell::Cell;
+use std::time::Instant;
 
 use glam::{DVec2, DVec3};
 
 use crate::geometry::{Hit, Ray};
 use crate::math::vector::dot;
 use crate::render::answers::Answers;
-use crate::render::settings::RayCounts;
+use crate::render::settings::{RayCounts, ThreadSeconds};
 use crate::render::surface::SurfacePoint;
 use crate::render::world::World;
 use crate::scene::camera::ViewRay;
@@ -22,6 +23,8 @@ pub struct Tracer<'a, I> {
     /// What answers rays.
     pub(super) intersect: &'a I,
     pub(super) counts: Cell<RayCounts>,
+    /// What its batches took; `rest` is not known here.
+    pub(super) seconds: Cell<ThreadSeconds>,
 }
 
 /// A ray on its way: in the precision of what answers it, and in f64 for shading.
@@ -43,7 +46,7 @@ impl TracedRay {
 impl<'a, I: Answers> Tracer<'a, I> {
     /// A tracer that has counted nothing yet.
     pub fn new(scene: &'a Scene, world: &'a World, intersect: &'a I) -> Self {
-        Self { scene, world, intersect, counts: Cell::default() }
+        Self { scene, world, intersect, counts: Cell::default(), seconds: Cell::default() }
     }
 
     /// The linear colour that a ray sees; `depth` counts the reflections and refractions before it.
@@ -80,6 +83,21 @@ impl<'a, I: Answers> Tracer<'a, I> {
     /// The rays traced so far.
     pub fn counts(&self) -> RayCounts {
         self.counts.get()
+    }
+
+    /// What [batches](Self::trace_cameras) took so far; single rays are not timed.
+    pub fn seconds(&self) -> ThreadSeconds {
+        self.seconds.get()
+    }
+
+    /// Does some work, whose time counts as `spent` on what it says.
+    pub(super) fn timed<T>(&self, spent: impl FnOnce(&mut ThreadSeconds, f64), work: impl FnOnce() -> T) -> T {
+        let start = Instant::now();
+        let done = work();
+        let mut seconds = self.seconds.get();
+        spent(&mut seconds, start.elapsed().as_secs_f64());
+        self.seconds.set(seconds);
+        done
     }
 
     pub(super) fn count(&self, add: impl FnOnce(&mut RayCounts)) {

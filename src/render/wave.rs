@@ -7,6 +7,7 @@
 
 use crate::geometry::Hit;
 use crate::render::answers::{Answers, Meeting};
+use crate::render::settings::ThreadSeconds;
 use crate::render::shade::SurfaceColors;
 use crate::render::shadow::Illumination;
 use crate::render::surface::SurfacePoint;
@@ -47,11 +48,16 @@ impl<I: Answers> Tracer<'_, I> {
     /// [`trace_camera`](Self::trace_camera) for each ray: what it sees and what it hit.
     pub fn trace_cameras(&self, views: Vec<ViewRay>) -> (Vec<Rgb>, Vec<Hit>) {
         self.count(|counts| counts.camera += views.len() as u64);
-        let mut rays = Vec::with_capacity(views.len());
-        for view in &views {
-            rays.push(self.intersect.camera_ray(view));
-        }
-        self.trace_wave(Rays { rays, views }, 0)
+        // Traversal is timed within.
+        let before = self.seconds().traversal;
+        let all = |seconds: &mut ThreadSeconds, all: f64| seconds.shading += all - (seconds.traversal - before);
+        self.timed(all, || {
+            let mut rays = Vec::with_capacity(views.len());
+            for view in &views {
+                rays.push(self.intersect.camera_ray(view));
+            }
+            self.trace_wave(Rays { rays, views }, 0)
+        })
     }
 
     fn trace_all(&self, all: Rays<I::Ray>, depth: u32) -> Vec<Rgb> {
@@ -68,7 +74,7 @@ impl<I: Answers> Tracer<'_, I> {
     /// The colours that rays see, and what they hit first.
     fn trace_wave(&self, traced: Rays<I::Ray>, depth: u32) -> (Vec<Rgb>, Vec<Hit>) {
         let mut hits = vec![Hit::MISS; traced.rays.len()];
-        self.intersect.first_hits(&traced.rays, &mut hits);
+        self.timed(traversal, || self.intersect.first_hits(&traced.rays, &mut hits));
         let mut colors = vec![Rgb::ZERO; hits.len()];
         let mut shadings = Vec::with_capacity(hits.len());
         for (number, (first, color)) in hits.iter_mut().zip(&mut colors).enumerate() {
@@ -138,7 +144,7 @@ impl<I: Answers> Tracer<'_, I> {
             self.count(|counts| counts.shadow += rays.len() as u64);
             blocked.clear();
             blocked.resize(rays.len(), false);
-            self.intersect.are_blocked_by_opaque(&rays, &mut blocked);
+            self.timed(traversal, || self.intersect.are_blocked_by_opaque(&rays, &mut blocked));
             for (((number, illumination), ray), blocked) in lit.iter().zip(&rays).zip(&blocked) {
                 if *blocked {
                     continue;
@@ -152,6 +158,10 @@ impl<I: Answers> Tracer<'_, I> {
             }
         }
     }
+}
+
+fn traversal(seconds: &mut ThreadSeconds, spent: f64) {
+    seconds.traversal += spent;
 }
 
 impl<R> Rays<R> {

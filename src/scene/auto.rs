@@ -205,7 +205,7 @@ mod tests {
             transform: DAffine3::from_translation(DVec3::new(x, 0.0, 0.0)),
             material: None,
         };
-        Scene { meshes: vec![mesh], objects: vec![object(0.0), object(5.0)], ..Default::default() }
+        Scene { meshes: vec![mesh.into()], objects: vec![object(0.0), object(5.0)], ..Default::default() }
     }
 
     #[test]
@@ -239,7 +239,8 @@ mod tests {
             indices.insert(base / 2, [0, 3, 1]);
             let mesh = TriangleMesh { positions: positions.clone(), indices, ..Default::default() };
             let object = Object { shape: Shape::Mesh(0), ..cube().objects[0].clone() };
-            let scene = Scene { meshes: vec![mesh.finish().unwrap()], objects: vec![object], ..Default::default() };
+            let scene =
+                Scene { meshes: vec![mesh.finish().unwrap().into()], objects: vec![object], ..Default::default() };
             let Camera::LookAt { eye, .. } = frame(&scene, 0.5, 0.3, 0.6) else { panic!() };
             eye
         };

@@ -92,7 +92,7 @@ mod tests {
             ..Default::default()
         };
         Scene {
-            meshes: vec![mesh.finish().unwrap(), TriangleMesh::default()],
+            meshes: vec![mesh.finish().unwrap().into(), TriangleMesh::default().into()],
             quadrics: vec![shapes::sphere(), shapes::plane(None)],
             ..Default::default()
         }

@@ -16,6 +16,8 @@ mod outline;
 pub mod room;
 pub mod texture;
 
+use std::sync::Arc;
+
 pub use background::Background;
 pub use camera::{Camera, NamedCamera, Projection};
 pub use film::{Clamp, FilmSettings, Transfer};
@@ -56,7 +58,7 @@ pub struct Scene {
     /// Images that materials refer to by position.
     pub textures: Vec<Texture>,
     /// Meshes that objects refer to by position.
-    pub meshes: Vec<TriangleMesh>,
+    pub meshes: Vec<Arc<TriangleMesh>>,
     /// Quadrics that objects refer to by position.
     pub quadrics: Vec<Quadric>,
     /// What there is to hit, in file order: an object's position is its instance number.

@@ -67,8 +67,11 @@ mod tests {
         let mesh = crate::geometry::TriangleMesh { origin: DVec3::new(64.0, -32.0, 8.0), ..Default::default() };
         let upright = DAffine3::from_mat3(glam::DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y));
         let object = |transform| Object { name: "m".into(), shape: Shape::Mesh(0), transform, material: None };
-        let scene =
-            |transform| Scene { meshes: vec![mesh.clone()], objects: vec![object(transform)], ..Scene::default() };
+        let scene = |transform| Scene {
+            meshes: vec![mesh.clone().into()],
+            objects: vec![object(transform)],
+            ..Scene::default()
+        };
         assert_eq!(choose(&scene(upright)), DVec3::new(64.0, 8.0, 32.0));
         assert_eq!(choose(&scene(DAffine3::from_scale(DVec3::splat(2.0)))), DVec3::ZERO, "nothing to see there");
     }
@@ -77,7 +80,7 @@ mod tests {
     fn an_untransformed_mesh_gives_its_own_origin() {
         let mesh = crate::geometry::TriangleMesh { origin: DVec3::new(0.0, 0.125, 0.0), ..Default::default() };
         let object = Object { name: "m".into(), shape: Shape::Mesh(0), transform: DAffine3::IDENTITY, material: None };
-        let scene = Scene { meshes: vec![mesh], objects: vec![object], ..Scene::default() };
+        let scene = Scene { meshes: vec![mesh.into()], objects: vec![object], ..Scene::default() };
         assert_eq!(choose(&scene), DVec3::new(0.0, 0.125, 0.0));
     }
 }

@@ -74,7 +74,7 @@ mod tests {
         objects.push(object(Shape::Quadric(0), place(0)));
         objects.push(object(Shape::Quadric(1), place(0)));
         Scene {
-            meshes: vec![mesh.finish().unwrap()],
+            meshes: vec![mesh.finish().unwrap().into()],
             quadrics: vec![shapes::sphere(), shapes::plane(None)],
             objects,
             ..Default::default()

@@ -99,7 +99,7 @@ mod tests {
         let object =
             Object { name: String::new(), shape: Shape::Mesh(0), transform: glam::DAffine3::IDENTITY, material: None };
         let scene = |mesh: &TriangleMesh| Scene {
-            meshes: vec![mesh.clone()],
+            meshes: vec![mesh.clone().into()],
             objects: vec![object.clone()],
             ..Default::default()
         };

@@ -1,5 +1,7 @@
 //! Builds end, in time and when told to, and describe themselves.
 
+use std::sync::Arc;
+
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
@@ -11,7 +13,7 @@ use crate::geometry::{Hit, PreparedRay, Ray, TriangleMesh};
 use crate::progress::{Progress, Silent};
 
 /// Builds, and fails where that takes unreasonably long or the tree is unreasonably deep.
-fn build_in_time<A: TriangleAccelerator>(name: &str, mesh: &TriangleMesh, preset: Preset) -> A {
+fn build_in_time<A: TriangleAccelerator>(name: &str, mesh: &Arc<TriangleMesh>, preset: Preset) -> A {
     let start = Instant::now();
     let accelerator = A::build(mesh, &Params { preset, ..Params::default() }, &Silent).unwrap();
     let (took, stats) = (start.elapsed(), accelerator.stats());

@@ -1,5 +1,7 @@
 //! Asks every structure and preset the same and compares with `linear`, bit for bit.
 
+use std::sync::Arc;
+
 use glam::Vec3;
 
 use super::meshes::Random;
@@ -11,7 +13,7 @@ use crate::progress::Silent;
 
 /// Rays at, past and along a mesh: towards corners, edge points and inner points from outside, inside and on it, with
 /// raw and axis-parallel directions.
-pub fn rays_at(mesh: &TriangleMesh, random: &mut Random, count: usize) -> Vec<Ray> {
+pub fn rays_at(mesh: &Arc<TriangleMesh>, random: &mut Random, count: usize) -> Vec<Ray> {
     let bounds = mesh.bounds();
     let (center, size) = (bounds.center().as_vec3(), bounds.size().as_vec3().max_element().max(1e-30));
     let live: Vec<u32> = mesh.live_triangles().collect();
@@ -119,7 +121,7 @@ fn check_counts<A: Counting>(accelerator: &A, ray: &PreparedRay, closest: &Hit, 
     assert!(occluded || all == few, "{}: {all:?} {few:?}", A::NAME);
 }
 
-fn answers<A: Counting>(mesh: &TriangleMesh, preset: Preset, rays: &[PreparedRay]) -> (Vec<Answer>, TreeStats) {
+fn answers<A: Counting>(mesh: &Arc<TriangleMesh>, preset: Preset, rays: &[PreparedRay]) -> (Vec<Answer>, TreeStats) {
     let params = Params { preset, ..Params::default() };
     let accelerator = A::build(mesh, &params, &Silent).unwrap();
     accelerator.validate().unwrap_or_else(|violation| panic!("{} {preset:?}: {violation}", A::NAME));
@@ -164,7 +166,7 @@ fn check_batches<A: TriangleAccelerator>(accelerator: &A, rays: &[PreparedRay], 
 }
 
 /// Compares all structures and presets with `linear`; returns how many rays hit.
-pub fn compare(name: &str, mesh: &TriangleMesh, rays: &[PreparedRay]) -> usize {
+pub fn compare(name: &str, mesh: &Arc<TriangleMesh>, rays: &[PreparedRay]) -> usize {
     let (expected, _) = answers::<Linear>(mesh, Preset::Balanced, rays);
     for &kind in &Kind::ALL[1..] {
         for &preset in Preset::ALL {
@@ -182,7 +184,7 @@ pub fn compare(name: &str, mesh: &TriangleMesh, rays: &[PreparedRay]) -> usize {
 }
 
 /// Compares on rays made for the mesh; at least a quarter must hit for the test to mean anything.
-pub fn compare_on_hard_rays(name: &str, mesh: &TriangleMesh, count: usize) {
+pub fn compare_on_hard_rays(name: &str, mesh: &Arc<TriangleMesh>, count: usize) {
     let mut random = Random::new(hash2(count as u32, mesh.indices.len() as u32));
     let rays = prepare(&rays_at(mesh, &mut random, count), &mut random);
     let hits = compare(name, mesh, &rays);

@@ -1,5 +1,7 @@
 //! Structures give the same hits as `linear`, bit for bit, on ordinary and on hard rays.
 
+use std::sync::Arc;
+
 use std::ops::ControlFlow;
 
 use glam::{DVec3, Quat, Vec3};
@@ -123,7 +125,7 @@ fn a_closed_sphere_has_no_leaks() {
 }
 
 /// The leaves that a ray visits within `[near, far]`.
-fn leaves_visited<T: TriangleTree>(mesh: &TriangleMesh, ray: &PreparedRay, near: f32, far: f32) -> u32 {
+fn leaves_visited<T: TriangleTree>(mesh: &Arc<TriangleMesh>, ray: &PreparedRay, near: f32, far: f32) -> u32 {
     let tree = <T as TriangleAccelerator>::build(mesh, &Params::default(), &Silent).unwrap();
     let mut visited = 0;
     let _ = tree.traverse(
@@ -158,7 +160,7 @@ fn nodes_outside_the_interval_are_not_visited() {
 }
 
 /// A tetrahedron or a box of any proportions, turned or along the axes.
-fn solid(random: &mut Random) -> TriangleMesh {
+fn solid(random: &mut Random) -> Arc<TriangleMesh> {
     let size = |random: &mut Random| 10f32.powf(random.unit() * 3.0 - 2.0);
     let scale = Vec3::new(size(random), size(random), size(random));
     if random.below(3) == 0 {
@@ -217,7 +219,7 @@ fn meshes_without_live_triangles() {
     let flat = soup(&[[Vec3::ZERO, Vec3::X, Vec3::X * 2.0], [Vec3::splat(f32::NAN); 3]]);
     let rays: Vec<_> =
         (0..20).filter_map(|i| PreparedRay::new(&Ray::new(Vec3::ZERO, Random::new(i).vector()))).collect();
-    for empty in [TriangleMesh::default(), flat] {
+    for empty in [TriangleMesh::default().into(), flat] {
         assert_eq!(compare("empty", &empty, &rays), 0);
     }
 }
@@ -225,11 +227,11 @@ fn meshes_without_live_triangles() {
 #[test]
 fn dropped_triangles_do_not_shift_numbers() {
     let mut random = Random::new(8);
-    let mut soup = random_soup(&mut random, 60, 0.5);
+    let mut soup = Arc::unwrap_or_clone(random_soup(&mut random, 60, 0.5));
     for number in [0, 7, 8, 59] {
         soup.indices[number][1] = soup.indices[number][0];
     }
-    let soup = soup.finish().unwrap();
+    let soup = Arc::new(soup.finish().unwrap());
     assert_eq!(soup.live_count(), 56);
     compare_on_hard_rays("dropped", &soup, 300);
 }

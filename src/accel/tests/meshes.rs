@@ -1,5 +1,7 @@
 //! Meshes that tests are made of, and the random numbers behind them.
 
+use std::sync::Arc;
+
 use glam::Vec3;
 
 use crate::geometry::TriangleMesh;
@@ -29,17 +31,17 @@ impl Random {
     }
 }
 
-pub fn mesh(positions: Vec<Vec3>, indices: Vec<[u32; 3]>) -> TriangleMesh {
-    TriangleMesh { positions, indices, ..TriangleMesh::default() }.finish().unwrap()
+pub fn mesh(positions: Vec<Vec3>, indices: Vec<[u32; 3]>) -> Arc<TriangleMesh> {
+    TriangleMesh { positions, indices, ..TriangleMesh::default() }.finish().unwrap().into()
 }
 
 /// Triangles that share nothing.
-pub fn soup(triangles: &[[Vec3; 3]]) -> TriangleMesh {
+pub fn soup(triangles: &[[Vec3; 3]]) -> Arc<TriangleMesh> {
     let indices = (0..triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
     mesh(triangles.concat(), indices)
 }
 
-pub fn random_soup(random: &mut Random, count: usize, size: f32) -> TriangleMesh {
+pub fn random_soup(random: &mut Random, count: usize, size: f32) -> Arc<TriangleMesh> {
     let triangle = |random: &mut Random| {
         let center = random.vector();
         [(); 3].map(|()| center + random.vector() * size)
@@ -48,7 +50,7 @@ pub fn random_soup(random: &mut Random, count: usize, size: f32) -> TriangleMesh
 }
 
 /// A closed sphere of `rows` by `columns` quadrilaterals, radius 2, around the origin.
-pub fn sphere(rows: u32, columns: u32) -> TriangleMesh {
+pub fn sphere(rows: u32, columns: u32) -> Arc<TriangleMesh> {
     let mut positions = vec![Vec3::new(0.0, 0.0, 2.0)];
     for row in 1..rows {
         let polar = std::f64::consts::PI * f64::from(row) / f64::from(rows);
@@ -77,7 +79,7 @@ pub fn sphere(rows: u32, columns: u32) -> TriangleMesh {
 }
 
 /// An axis-flat grid of unit squares around the origin in the plane where coordinate `axis` is `height`.
-pub fn grid(cells: u32, axis: usize, height: f32) -> TriangleMesh {
+pub fn grid(cells: u32, axis: usize, height: f32) -> Arc<TriangleMesh> {
     let side = cells + 1;
     let point = |i: u32| {
         let (x, y) = ((i % side) as f32 - cells as f32 / 2.0, (i / side) as f32 - cells as f32 / 2.0);
@@ -94,7 +96,7 @@ pub fn grid(cells: u32, axis: usize, height: f32) -> TriangleMesh {
     mesh((0..side * side).map(point).collect(), (0..cells * cells).flat_map(|i| cell(i % cells, i / cells)).collect())
 }
 
-pub fn transformed(mesh: &TriangleMesh, scale: f32, shift: Vec3) -> TriangleMesh {
+pub fn transformed(mesh: &Arc<TriangleMesh>, scale: f32, shift: Vec3) -> Arc<TriangleMesh> {
     let positions = mesh.positions.iter().map(|&p| p * scale + shift).collect();
-    TriangleMesh { positions, ..mesh.clone() }.finish().unwrap()
+    TriangleMesh { positions, ..(**mesh).clone() }.finish().unwrap().into()
 }

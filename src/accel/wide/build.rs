@@ -1,8 +1,8 @@
 //! How the tree is built: chunk by chunk on all threads, each put in its place as soon as those before it are.
 
 use std::collections::BTreeMap;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
 
 use rayon::prelude::*;
 
@@ -19,22 +19,29 @@ use crate::error::Result;
 use crate::geometry::{Bounds, TriangleMesh};
 use crate::progress::{Progress, Share};
 
-/// Builds the tree of a mesh and returns it with the box around it. Each live triangle is a step of `progress`.
+/// Builds the tree of a mesh, with compact leaves or not, and returns it with the box around it. Each live triangle is a step of
+/// `progress`.
 ///
 /// # Errors
 /// When `progress` says to stop.
-pub fn build(mesh: &TriangleMesh, preset: Preset, progress: &dyn Progress) -> Result<(Tree, Bounds)> {
+pub fn build(
+    mesh: &Arc<TriangleMesh>,
+    compact: bool,
+    preset: Preset,
+    progress: &dyn Progress,
+) -> Result<(Tree, Bounds)> {
     progress.check()?;
     let mut references = Reference::all(mesh);
     let Chunks { bounds, top, chunks } = Chunks::cut(&mut references);
     progress.check()?;
-    let assembly = Mutex::new(Assembly::new(top, mesh.live_count()));
+    let leaves = |triangles: usize| Leaves::with_capacity(triangles, compact.then(|| mesh.clone()));
+    let assembly = Mutex::new(Assembly::new(top, leaves(mesh.live_count()), mesh.live_count()));
     let next = AtomicUsize::new(0);
     let work = || -> Result<()> {
         loop {
             let number = next.fetch_add(1, Ordering::Relaxed);
             let Some(chunk) = chunks.get(number) else { return Ok(()) };
-            let built = Built::new(mesh, chunk, preset, progress)?;
+            let built = Built::new(mesh, chunk, leaves(chunk.references.len()), preset, progress)?;
             assembly.lock().expect("no thread panics with it").accept(&chunks, number, built);
         }
     };
@@ -56,13 +63,19 @@ struct Built {
 }
 
 impl Built {
-    fn new(mesh: &TriangleMesh, chunk: &Chunk<'_>, preset: Preset, progress: &dyn Progress) -> Result<Self> {
+    fn new(
+        mesh: &TriangleMesh,
+        chunk: &Chunk<'_>,
+        leaves: Leaves,
+        preset: Preset,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
         let mut share = Share::new(progress, chunk.references.len() as u64);
         let boxes: Vec<Bounds> = chunk.references.iter().map(|reference| reference.bounds).collect();
         let topology = Topology::build(&boxes, preset, 1, &mut share)?;
         let triangle = |&at: &u32| LeafTriangle::new(mesh, chunk.references[at as usize].primitive);
         let triangles: Vec<_> = topology.order.iter().map(triangle).collect();
-        let mut collapse = Collapse::new(&topology, &triangles);
+        let mut collapse = Collapse::new(&topology, &triangles, leaves);
         let root = collapse.run(chunk.depth);
         share.reach(100)?;
         Ok(Self { nodes: collapse.nodes, leaves: collapse.leaves, root })
@@ -84,11 +97,12 @@ impl Assembly {
     /// Fewer triangles than a node has below it in most trees, so that the room suffices: 25 on a dragon of 871 k.
     const TRIANGLES_A_NODE: usize = 16;
 
-    fn new(top: Vec<Node>, triangles: usize) -> Self {
+    /// With the top and room for the leaves of all chunks.
+    fn new(top: Vec<Node>, leaves: Leaves, triangles: usize) -> Self {
         let root = if top.is_empty() { Child::NONE } else { Child::inner(0) };
         let mut nodes = top;
         nodes.reserve(triangles.div_ceil(Self::TRIANGLES_A_NODE));
-        Self { nodes, leaves: Leaves::with_capacity(triangles), root, next: 0, waiting: BTreeMap::new() }
+        Self { nodes, leaves, root, next: 0, waiting: BTreeMap::new() }
     }
 
     /// Takes what was built of a chunk.

@@ -42,8 +42,8 @@ pub struct Collapse<'a> {
 }
 
 impl<'a> Collapse<'a> {
-    /// Finds the costs. The topology must have leaves of one triangle.
-    pub fn new(topology: &'a Topology, triangles: &'a [LeafTriangle]) -> Self {
+    /// Finds the costs. The topology must have leaves of one triangle; the wide tree's will go to `leaves`, which are empty.
+    pub fn new(topology: &'a Topology, triangles: &'a [LeafTriangle], leaves: Leaves) -> Self {
         let source = topology.nodes.as_slice();
         let mut costs = vec![[0.0; WIDTH - 1]; source.len()];
         let mut ranges = vec![(0, 0); source.len()];
@@ -65,7 +65,6 @@ impl<'a> Collapse<'a> {
             }
             costs[number] = cost;
         }
-        let leaves = Leaves::with_capacity(triangles.len());
         Self { source, triangles, costs, ranges, nodes: Vec::new(), leaves }
     }
 

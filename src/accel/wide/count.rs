@@ -17,7 +17,7 @@ pub fn count(tree: &Tree, ray: &PreparedRay, any: bool, best: &mut Hit, tests: &
     while let Some(child) = next {
         if child.is_leaf() {
             tests.triangles += child.count() as u64;
-            for triangle in tree.leaves.triangles(child.first(), child.count()) {
+            for triangle in tree.leaves.triangles(child) {
                 if let Some(hit) = triangle.intersect(ray, 0).filter(|hit| hit.key().is_before(&best.key())) {
                     *best = hit;
                     if any {

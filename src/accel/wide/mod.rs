@@ -15,6 +15,8 @@ pub mod simd;
 #[cfg(test)]
 mod tests;
 
+use std::sync::Arc;
+
 use collapse::MOST_DEPTH;
 use leaf::Leaves;
 use node::{Child, Node};
@@ -43,19 +45,26 @@ impl Tree {
     const LARGE: usize = 64 << 20;
 
     fn new(nodes: Vec<Node>, leaves: Leaves, root: Child) -> Self {
-        let is_large = size_of_val(nodes.as_slice()) + size_of_val(leaves.words()) >= Self::LARGE;
+        let is_large = size_of_val(nodes.as_slice()) + leaves.bytes_read() >= Self::LARGE;
         Self { nodes, leaves, root, is_large }
     }
 }
 
-/// An 8-wide tree with exact boxes.
-pub struct Wide {
+/// An 8-wide tree with exact boxes, whose leaves have copies of their triangles or, compact, only their numbers in the mesh,
+/// which the tree then shares.
+pub struct WideTree<const COMPACT: bool> {
     tree: Tree,
     bounds: Bounds,
     level: Level,
 }
 
-impl Wide {
+/// The fastest.
+pub type Wide = WideTree<false>;
+
+/// The smallest: a third of the memory, beside the mesh.
+pub type Compact = WideTree<true>;
+
+impl<const COMPACT: bool> WideTree<COMPACT> {
     /// The same tree searched with another instruction set.
     #[cfg(test)]
     fn with_level(mut self, level: Level) -> Self {
@@ -71,16 +80,16 @@ impl Wide {
     }
 }
 
-impl TriangleAccelerator for Wide {
-    const NAME: &'static str = "wide";
+impl<const COMPACT: bool> TriangleAccelerator for WideTree<COMPACT> {
+    const NAME: &'static str = if COMPACT { "compact" } else { "wide" };
 
-    fn build(mesh: &TriangleMesh, params: &Params, progress: &dyn Progress) -> Result<Self> {
+    fn build(mesh: &Arc<TriangleMesh>, params: &Params, progress: &dyn Progress) -> Result<Self> {
         if mesh.live_count() >= Child::MOST {
             let message =
                 format!("mesh `{}` has {} triangles; a wide tree holds {}", mesh.name, mesh.live_count(), Child::MOST);
             return Err(Error::limit(message));
         }
-        let (tree, bounds) = build::build(mesh, params.preset, progress)?;
+        let (tree, bounds) = build::build(mesh, COMPACT, params.preset, progress)?;
         let wide = Self { tree, bounds, level: Level::chosen() };
         debug_assert_eq!(wide.validate(), Ok(()), "{}", Self::NAME);
         Ok(wide)
@@ -133,7 +142,7 @@ impl TriangleAccelerator for Wide {
             triangles: self.tree.leaves.len() as u64,
             nodes: self.tree.nodes.len() as u64,
             node_bytes: size_of_val(self.tree.nodes.as_slice()) as u64,
-            leaf_bytes: size_of_val(self.tree.leaves.words()) as u64,
+            leaf_bytes: self.tree.leaves.bytes() as u64,
             sah_cost: if self.tree.nodes.is_empty() { 0.0 } else { 1.0 },
             ..TreeStats::default()
         };
@@ -169,7 +178,7 @@ impl TriangleAccelerator for Wide {
                 if child.first() + child.count() > self.tree.leaves.len() {
                     return Err(format!("the leaf at {} is out of range", child.first()));
                 }
-                for triangle in self.tree.leaves.triangles(child.first(), child.count()) {
+                for triangle in self.tree.leaves.triangles(child) {
                     if !bounds.contains(&triangle.bounds()) {
                         return Err(format!("the box around triangle {} is too small", triangle.primitive));
                     }
@@ -201,7 +210,7 @@ impl TriangleAccelerator for Wide {
     }
 }
 
-impl Counting for Wide {
+impl<const COMPACT: bool> Counting for WideTree<COMPACT> {
     fn count(&self, ray: &PreparedRay, any: bool, best: &mut Hit, tests: &mut Tests) {
         count::count(&self.tree, ray, any, best, tests);
     }

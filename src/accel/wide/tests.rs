@@ -1,5 +1,7 @@
 //! Instruction sets against each other, leaves and nodes of all sizes, and degenerate trees.
 
+use std::sync::Arc;
+
 use glam::Vec3;
 
 use super::collapse::Collapse;
@@ -13,13 +15,13 @@ use crate::geometry::triangle::hit_bounds;
 use crate::math::random::Random;
 use crate::progress::Silent;
 
-fn soup(triangles: impl IntoIterator<Item = [Vec3; 3]>) -> TriangleMesh {
+fn soup(triangles: impl IntoIterator<Item = [Vec3; 3]>) -> Arc<TriangleMesh> {
     let positions: Vec<Vec3> = triangles.into_iter().flatten().collect();
     let indices = (0..positions.len() as u32 / 3).map(|n| [3 * n, 3 * n + 1, 3 * n + 2]).collect();
-    TriangleMesh { positions, indices, ..TriangleMesh::default() }.finish().unwrap()
+    TriangleMesh { positions, indices, ..TriangleMesh::default() }.finish().unwrap().into()
 }
 
-fn confetti(count: usize, size: f64, random: &mut Random) -> TriangleMesh {
+fn confetti(count: usize, size: f64, random: &mut Random) -> Arc<TriangleMesh> {
     soup((0..count).map(|_| {
         let center = random.in_cube();
         [(); 3].map(|()| (center + random.in_cube() * size).as_vec3())
@@ -51,6 +53,35 @@ fn prepared(ray: &Ray, number: usize) -> Option<PreparedRay> {
     Some(prepared)
 }
 
+/// Compares single rays with the reference, and counts those that hit and those that hit twice.
+fn compare_alone<const COMPACT: bool>(
+    mesh: &Arc<TriangleMesh>,
+    level: Level,
+    linear: &Linear,
+    rays: &[Ray],
+) -> [usize; 2] {
+    let wide = WideTree::<COMPACT>::build(mesh, &Params::default(), &Silent).unwrap().with_level(level);
+    let (mut hits, mut second) = (0, 0);
+    for (number, ray) in rays.iter().enumerate() {
+        assert_eq!(wide.closest_alone(ray), linear.closest_alone(ray), "{} {ray:?}", level.name());
+        assert_eq!(wide.occluded_alone(ray), linear.occluded_alone(ray), "{} {ray:?}", level.name());
+        let Some(ray) = prepared(ray, number) else { continue };
+        let closest = |tree: &dyn Fn(&mut Hit)| {
+            let mut hit = Hit::MISS;
+            tree(&mut hit);
+            hit
+        };
+        let hit = closest(&|hit| linear.closest(&ray, 7, hit));
+        assert_eq!(closest(&|hit| wide.closest(&ray, 7, hit)), hit, "{} {ray:?}", level.name());
+        assert_eq!(wide.occluded(&ray), hit.is_hit(), "{} {ray:?}", level.name());
+        let next = closest(&|next| linear.next_after(&ray, 7, hit.key(), next));
+        assert_eq!(closest(&|next| wide.next_after(&ray, 7, hit.key(), next)), next, "{} {ray:?}", level.name());
+        hits += usize::from(hit.is_hit());
+        second += usize::from(next.is_hit());
+    }
+    [hits, second]
+}
+
 #[test]
 fn all_instruction_sets_give_the_hits_of_the_reference() {
     let mut random = Random::new(4, 0x51d);
@@ -61,30 +92,8 @@ fn all_instruction_sets_give_the_hits_of_the_reference() {
         let linear = Linear::build(&mesh, &params, &Silent).unwrap();
         let rays = rays(600, &mut random);
         for level in Level::available() {
-            let wide = Wide::build(&mesh, &params, &Silent).unwrap().with_level(level);
-            let (mut hits, mut second) = (0, 0);
-            for (number, ray) in rays.iter().enumerate() {
-                assert_eq!(wide.closest_alone(ray), linear.closest_alone(ray), "{} {ray:?}", level.name());
-                assert_eq!(wide.occluded_alone(ray), linear.occluded_alone(ray), "{} {ray:?}", level.name());
-                let Some(ray) = prepared(ray, number) else { continue };
-                let closest = |tree: &dyn Fn(&mut Hit)| {
-                    let mut hit = Hit::MISS;
-                    tree(&mut hit);
-                    hit
-                };
-                let hit = closest(&|hit| linear.closest(&ray, 7, hit));
-                assert_eq!(closest(&|hit| wide.closest(&ray, 7, hit)), hit, "{} {ray:?}", level.name());
-                assert_eq!(wide.occluded(&ray), hit.is_hit(), "{} {ray:?}", level.name());
-                let next = closest(&|next| linear.next_after(&ray, 7, hit.key(), next));
-                assert_eq!(
-                    closest(&|next| wide.next_after(&ray, 7, hit.key(), next)),
-                    next,
-                    "{} {ray:?}",
-                    level.name()
-                );
-                hits += usize::from(hit.is_hit());
-                second += usize::from(next.is_hit());
-            }
+            let [hits, second] = compare_alone::<false>(&mesh, level, &linear, &rays);
+            assert_eq!(compare_alone::<true>(&mesh, level, &linear, &rays), [hits, second]);
             assert!(count < 40 || hits > 20 && second > 3, "{hits} and {second} of {} rays hit", rays.len());
         }
     }
@@ -102,6 +111,33 @@ fn bundles(count: usize, random: &mut Random) -> Vec<Ray> {
         }));
     }
     bundles
+}
+
+/// Compares whole packets, and what is left over, with the reference's hits.
+fn compare_batches<const COMPACT: bool>(
+    mesh: &Arc<TriangleMesh>,
+    level: Level,
+    asked: &[Ray],
+    clips: &[Interval],
+    expected: &[Hit],
+) {
+    let wide = WideTree::<COMPACT>::build(mesh, &Params::default(), &Silent).unwrap().with_level(level);
+    let large = WideTree::<COMPACT>::build(mesh, &Params::default(), &Silent).unwrap().with_level(level).with_turns();
+    // Whole packets, and what is left over.
+    for (wide, size) in [(&wide, asked.len()), (&wide, 16), (&wide, 21), (&large, asked.len()), (&large, 3)] {
+        let mut hits = vec![Hit::MISS; asked.len()];
+        let mut occluded = vec![false; asked.len()];
+        for (at, rays) in asked.chunks(size).enumerate() {
+            let part = at * size..at * size + rays.len();
+            let clips = if clips.is_empty() { clips } else { &clips[part.clone()] };
+            wide.closest_batch(rays, clips, 3, &mut hits[part.clone()]);
+            wide.occluded_batch(rays, clips, &mut occluded[part]);
+        }
+        for (((ray, expected), hit), occluded) in asked.iter().zip(expected).zip(&hits).zip(occluded) {
+            assert_eq!(bytemuck::bytes_of(hit), bytemuck::bytes_of(expected), "{} {ray:?}", level.name());
+            assert_eq!(occluded, expected.is_hit(), "{} {ray:?}", level.name());
+        }
+    }
 }
 
 #[test]
@@ -127,24 +163,8 @@ fn packets_give_the_hits_of_the_reference() {
                 expected.iter().filter(|hit| hit.is_hit()).count()
             );
             for level in Level::available() {
-                let wide = Wide::build(&mesh, &params, &Silent).unwrap().with_level(level);
-                let large = Wide::build(&mesh, &params, &Silent).unwrap().with_level(level).with_turns();
-                // Whole packets, and what is left over.
-                for (wide, size) in [(&wide, asked.len()), (&wide, 16), (&wide, 21), (&large, asked.len()), (&large, 3)]
-                {
-                    let mut hits = vec![Hit::MISS; asked.len()];
-                    let mut occluded = vec![false; asked.len()];
-                    for (at, rays) in asked.chunks(size).enumerate() {
-                        let part = at * size..at * size + rays.len();
-                        let clips = if clips.is_empty() { clips } else { &clips[part.clone()] };
-                        wide.closest_batch(rays, clips, 3, &mut hits[part.clone()]);
-                        wide.occluded_batch(rays, clips, &mut occluded[part]);
-                    }
-                    for (((ray, expected), hit), occluded) in asked.iter().zip(&expected).zip(&hits).zip(occluded) {
-                        assert_eq!(bytemuck::bytes_of(hit), bytemuck::bytes_of(expected), "{} {ray:?}", level.name());
-                        assert_eq!(occluded, expected.is_hit(), "{} {ray:?}", level.name());
-                    }
-                }
+                compare_batches::<false>(&mesh, level, &asked, clips, &expected);
+                compare_batches::<true>(&mesh, level, &asked, clips, &expected);
             }
         }
     }
@@ -189,7 +209,7 @@ fn deep_ends_are_cut_evenly() {
     }
     let topology = Topology { nodes, order: (0..count as u32).collect() };
     let triangles: Vec<_> = live.iter().map(|&number| LeafTriangle::new(&mesh, number)).collect();
-    let mut collapse = Collapse::new(&topology, &triangles);
+    let mut collapse = Collapse::new(&topology, &triangles, Leaves::default());
     let root = collapse.run(0);
     collapse.leaves.finish();
     let tree = Tree::new(collapse.nodes, collapse.leaves, root);

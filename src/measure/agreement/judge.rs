@@ -76,7 +76,7 @@ impl<'a> Judge<'a> {
             scene,
             world: World::new(scene)?,
             oracle: Oracle::new(scene)?,
-            neighbours: scene.meshes.iter().map(Neighbours::of).collect(),
+            neighbours: scene.meshes.iter().map(|mesh| Neighbours::of(mesh)).collect(),
         })
     }
 

@@ -5,6 +5,8 @@
 //! structures, which is what decides hits, and nothing else: neither builder, nor layout, nor box test. Where a scene has several
 //! instances those are asked in turn, each in its own box, as [`Linear`](crate::accel::Linear) is.
 
+use std::sync::Arc;
+
 use glam::{DVec3, Vec3};
 
 use crate::accel::{Params, TreeStats, TriangleAccelerator};
@@ -113,7 +115,7 @@ fn crosses(origin: DVec3, direction: DVec3, node: &Node) -> bool {
 impl TriangleAccelerator for Loose {
     const NAME: &'static str = "loose";
 
-    fn build(mesh: &TriangleMesh, _: &Params, progress: &dyn Progress) -> Result<Self> {
+    fn build(mesh: &Arc<TriangleMesh>, _: &Params, progress: &dyn Progress) -> Result<Self> {
         let mut share = Share::new(progress, mesh.live_count() as u64);
         let triangle = |primitive: u32| Triangle { corners: mesh.triangle(primitive), primitive };
         let triangles: Vec<_> = mesh.live_triangles().map(triangle).collect();
@@ -181,7 +183,7 @@ mod tests {
     fn hits_are_those_of_every_triangle() {
         let mut random = Random::new(1, 0x0001_005e);
         for (center, size) in [(DVec3::ZERO, 1.0), (DVec3::new(1e6, -3e5, 20.0), 40.0), (DVec3::ZERO, 1e-12)] {
-            let mesh = meshes::sphere(12, 24, size, center);
+            let mesh = Arc::new(meshes::sphere(12, 24, size, center));
             let (loose, linear) = (
                 Loose::build(&mesh, &Params::default(), &Silent).unwrap(),
                 Linear::build(&mesh, &Params::default(), &Silent).unwrap(),

@@ -1,5 +1,7 @@
 //! Meshes that several cases share.
 
+use std::sync::Arc;
+
 use glam::{DVec3, Vec3};
 
 use crate::geometry::TriangleMesh;
@@ -16,7 +18,12 @@ pub fn scene(meshes: Vec<TriangleMesh>) -> Scene {
         material: Some(0),
     };
     let objects = (0..meshes.len()).map(object).collect();
-    Scene { materials: vec![Material::default()], meshes, objects, ..Scene::default() }
+    Scene {
+        materials: vec![Material::default()],
+        meshes: meshes.into_iter().map(Arc::new).collect(),
+        objects,
+        ..Scene::default()
+    }
 }
 
 /// A finished mesh of vertices and triangles.

@@ -11,7 +11,7 @@ use crate::scene::Object;
 fn scene(meshes: Vec<(TriangleMesh, DAffine3)>) -> Scene {
     let mut scene = Scene::default();
     for (number, (mesh, transform)) in (0..).zip(meshes) {
-        scene.meshes.push(mesh.finish().unwrap());
+        scene.meshes.push(mesh.finish().unwrap().into());
         scene.objects.push(Object { name: String::new(), shape: Shape::Mesh(number), transform, material: None });
     }
     scene

@@ -150,7 +150,7 @@ impl Subject {
 pub fn of_mesh(mesh: TriangleMesh) -> Scene {
     let object =
         Object { name: mesh.name.clone(), shape: Shape::Mesh(0), transform: DAffine3::IDENTITY, material: None };
-    Scene { meshes: vec![mesh], objects: vec![object], ..Scene::default() }
+    Scene { meshes: vec![mesh.into()], objects: vec![object], ..Scene::default() }
 }
 
 fn moved_camera(named: &NamedCamera, moved: impl Fn(DVec3) -> DVec3, unit: f64) -> NamedCamera {

@@ -4,6 +4,7 @@
 //! combinations is the tests alone. It is slower than the renderer's trees, which are measured beside it.
 
 use std::cell::RefCell;
+use std::sync::Arc;
 
 use glam::Vec3;
 
@@ -32,7 +33,7 @@ impl Skeleton {
     ///
     /// # Errors
     /// A cancellation.
-    pub fn build(mesh: &TriangleMesh, params: &Params, progress: &dyn Progress) -> Result<Self> {
+    pub fn build(mesh: &Arc<TriangleMesh>, params: &Params, progress: &dyn Progress) -> Result<Self> {
         let mut share = Share::new(progress, 0);
         let live: Vec<u32> = mesh.live_triangles().collect();
         let boxes: Vec<Bounds> = live.iter().map(|&number| hit_bounds(mesh.triangle(number))).collect();

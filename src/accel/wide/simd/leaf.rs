@@ -4,7 +4,7 @@ use std::mem::MaybeUninit;
 
 use glam::Vec3A;
 
-use super::super::node::{Child, TRIANGLE_WORDS, WIDTH};
+use super::super::node::WIDTH;
 use super::Lanes;
 use super::single::Query;
 use crate::geometry::PreparedRay;
@@ -17,12 +17,16 @@ use crate::math::float::UNIT_ROUNDOFF;
 /// functions in f32, which only ever tell what is missed; what they leave is decided one by one.
 ///
 /// # Safety
-/// The processor has the instructions of `L`, and `words` are those of leaves, of which `leaf` is one.
+/// The processor has the instructions of `L`, and `numbers` is a leaf of `count` triangles, [laid
+/// out](super::super::leaf::Leaves::laid_out).
 #[inline(always)]
-pub unsafe fn meet_leaf<L: Lanes, Q: Query>(words: *const u32, leaf: Child, ray: &PreparedRay, query: &mut Q) -> bool {
+pub unsafe fn meet_leaf<L: Lanes, Q: Query>(
+    numbers: *const f32,
+    count: usize,
+    ray: &PreparedRay,
+    query: &mut Q,
+) -> bool {
     unsafe {
-        let count = leaf.count();
-        let numbers: *const f32 = words.add(leaf.first() * TRIANGLE_WORDS).cast();
         let [kx, ky, kz] = ray.axes;
         let origin: *const f32 = (&raw const ray.origin).cast();
         let (ox, oy, oz) = (L::splat(*origin.add(kx)), L::splat(*origin.add(ky)), L::splat(*origin.add(kz)));

@@ -28,7 +28,6 @@ use single::Query;
 
 use super::Tree;
 
-use super::node::Child;
 use crate::geometry::ray::Interval;
 use crate::geometry::{PreparedRay, Ray};
 
@@ -133,7 +132,7 @@ trait Lanes {
     unsafe fn search<Q: Query>(tree: &Tree, ray: &Ray, clip: Option<&Interval>, query: &mut Q);
 
     /// [`leaf::meet_leaf`] compiled for the set, and kept out of the loop over nodes, which needs the registers.
-    unsafe fn meet_leaf<Q: Query>(words: *const u32, leaf: Child, ray: &PreparedRay, query: &mut Q) -> bool;
+    unsafe fn meet_leaf<Q: Query>(numbers: *const f32, count: usize, ray: &PreparedRay, query: &mut Q) -> bool;
 }
 
 /// Sixteen f32 in rows, a lane a ray of a packet, and eight f64 at a time for what decides hits.

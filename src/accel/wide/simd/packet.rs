@@ -9,6 +9,7 @@
 use std::mem::MaybeUninit;
 
 use super::super::collapse::MOST_DEPTH;
+use super::super::leaf::Room;
 use super::super::node::{Child, NODE_SHIFT, Node, PLANE_BYTES, WIDTH};
 use super::single::{Closest, Occluded, walk_from};
 use super::{Rows, packet_leaf};
@@ -335,7 +336,7 @@ pub unsafe fn walk<L: Rows, const ANY: bool>(tree: &Tree, packet: &mut Packet<'_
             return;
         }
         let nodes: *const Node = tree.nodes.as_ptr();
-        let words: *const u32 = tree.leaves.words().as_ptr();
+        let mut room = Room::uninit();
         let [least, _] = L::row_ends(packet.near);
         let mut farthest = packet.farthest();
         let mut stack = [const { MaybeUninit::<Pending>::uninit() }; STACK];
@@ -345,7 +346,8 @@ pub unsafe fn walk<L: Rows, const ANY: bool>(tree: &Tree, packet: &mut Packet<'_
         let mut lanes = packet.alive;
         loop {
             if current.is_leaf() {
-                packet_leaf::meet::<L, ANY>(words, current, packet, lanes);
+                let numbers = tree.leaves.laid_out(current, &mut room);
+                packet_leaf::meet::<L, ANY>(numbers, current.count(), packet, lanes);
                 if ANY && packet.alive == 0 {
                     return;
                 }

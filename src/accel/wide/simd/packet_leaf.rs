@@ -5,7 +5,6 @@
 
 use glam::Vec3;
 
-use super::super::node::{Child, TRIANGLE_WORDS};
 use super::Rows;
 use super::packet::Packet;
 use crate::geometry::triangle::hit_bounds;
@@ -13,17 +12,16 @@ use crate::geometry::triangle::hit_bounds;
 /// Meets some rays of a packet with the triangles of a leaf.
 ///
 /// # Safety
-/// The processor has the instructions of `L`, and `words` are those of leaves, of which `leaf` is one.
+/// The processor has the instructions of `L`, and `numbers` is a leaf of `count` triangles, [laid
+/// out](super::super::leaf::Leaves::laid_out).
 #[inline(always)]
 pub unsafe fn meet<L: Rows, const ANY: bool>(
-    words: *const u32,
-    leaf: Child,
+    numbers: *const f32,
+    count: usize,
     packet: &mut Packet<'_, L>,
     mut lanes: u32,
 ) {
     unsafe {
-        let count = leaf.count();
-        let numbers: *const f32 = words.add(leaf.first() * TRIANGLE_WORDS).cast();
         let [kx, ky, kz] = packet.axes;
         for triangle in 0..count {
             let coordinate = |corner: usize, axis: usize| *numbers.add((3 * corner + axis) * count + triangle);

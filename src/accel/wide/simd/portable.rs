@@ -4,7 +4,6 @@ use super::packet::{self, Packet};
 use super::single::{self, Query};
 use super::{Lanes, Rows, leaf};
 use crate::accel::wide::Tree;
-use crate::accel::wide::node::Child;
 use crate::geometry::ray::Interval;
 use crate::geometry::{PreparedRay, Ray};
 
@@ -91,9 +90,9 @@ impl Lanes for Portable {
     }
 
     #[inline(never)]
-    unsafe fn meet_leaf<Q: Query>(words: *const u32, leaf: Child, ray: &PreparedRay, query: &mut Q) -> bool {
+    unsafe fn meet_leaf<Q: Query>(numbers: *const f32, count: usize, ray: &PreparedRay, query: &mut Q) -> bool {
         // SAFETY: as the caller promises.
-        unsafe { leaf::meet_leaf::<Self, Q>(words, leaf, ray, query) }
+        unsafe { leaf::meet_leaf::<Self, Q>(numbers, count, ray, query) }
     }
 }
 

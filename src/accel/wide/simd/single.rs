@@ -4,7 +4,8 @@ use std::borrow::BorrowMut;
 use std::mem::MaybeUninit;
 
 use super::super::collapse::MOST_DEPTH;
-use super::super::node::{Child, NODE_SHIFT, Node, PLANE_BYTES, TRIANGLE_WORDS, WIDTH};
+use super::super::leaf::Room;
+use super::super::node::{Child, NODE_SHIFT, Node, PLANE_BYTES, WIDTH};
 use super::{Lanes, Level, Portable, Set};
 use crate::accel::wide::Tree;
 use crate::geometry::ray::Interval;
@@ -382,7 +383,7 @@ unsafe fn walk_nodes<L: Lanes, Q: Query, const PARALLEL: bool>(
 ) {
     unsafe {
         let nodes: *const Node = tree.nodes.as_ptr();
-        let words: *const u32 = tree.leaves.words().as_ptr();
+        let mut room = Room::uninit();
         let spread = Spread::<L>::new(ray, query.near(ray), Sides::new(ray));
         let mut far = query.far(ray);
         let mut stack = [const { MaybeUninit::<Entry>::uninit() }; STACK];
@@ -391,7 +392,7 @@ unsafe fn walk_nodes<L: Lanes, Q: Query, const PARALLEL: bool>(
         let mut current = start;
         while current != Child::NONE {
             if current.is_leaf() {
-                if L::meet_leaf(words, current, ray, query) {
+                if L::meet_leaf(tree.leaves.laid_out(current, &mut room), current.count(), ray, query) {
                     return;
                 }
                 far = query.far(ray);
@@ -448,14 +449,15 @@ impl<Q: Query> Flight<Q> {
     pub unsafe fn step<L: Lanes>(&mut self, tree: &Tree) -> bool {
         unsafe {
             let nodes: *const Node = tree.nodes.as_ptr();
-            let words: *const u32 = tree.leaves.words().as_ptr();
             let stack: *mut Entry = self.stack.as_mut_ptr().cast();
             if self.current == Child::NONE {
                 return false;
             }
             let mut next = Child::NONE;
             if self.current.is_leaf() {
-                if L::meet_leaf(words, self.current, &self.ray, &mut self.query) {
+                let mut room = Room::uninit();
+                let numbers = tree.leaves.laid_out(self.current, &mut room);
+                if L::meet_leaf(numbers, self.current.count(), &self.ray, &mut self.query) {
                     return false;
                 }
                 self.far = self.query.far(&self.ray);
@@ -472,8 +474,8 @@ impl<Q: Query> Flight<Q> {
                 return false;
             }
             let (from, lines) = if next.is_leaf() {
-                let from: *const u8 = words.add(next.first() * TRIANGLE_WORDS).cast();
-                (from, (next.count() * TRIANGLE_WORDS * 4).div_ceil(LINE))
+                let (from, words) = tree.leaves.stored(next);
+                (from.cast::<u8>(), (words * size_of::<u32>()).div_ceil(LINE))
             } else {
                 (nodes.byte_add(next.number() << NODE_SHIFT).cast(), size_of::<Node>() / LINE)
             };
