@@ -8,6 +8,7 @@ pub mod float;
 pub mod origin;
 pub mod quadratic;
 pub mod random;
+pub mod simd;
 pub mod transform;
 pub mod vector;
 

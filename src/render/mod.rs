@@ -9,6 +9,7 @@
 //! Pictures take the same steps for many rays at once (`wave`), and give the same bytes.
 
 pub mod answers;
+mod chunk;
 pub mod film;
 pub mod intersect;
 pub mod ray_tracing;

@@ -20,7 +20,7 @@ use std::sync::Arc;
 use collapse::MOST_DEPTH;
 use leaf::Leaves;
 use node::{Child, Node};
-use simd::{Closest, Level, NextAfter, Occluded};
+use simd::{Closest, NextAfter, Occluded};
 
 use super::leaf::{check_distinct, check_partition};
 use super::topology::half_area;
@@ -28,6 +28,7 @@ use super::{Counting, Params, Tests, TreeStats, TriangleAccelerator};
 use crate::error::{Error, Result};
 use crate::geometry::ray::Interval;
 use crate::geometry::{Bounds, Hit, Key, PreparedRay, Ray, TriangleMesh};
+use crate::math::simd::Level;
 use crate::progress::Progress;
 
 /// Nodes and leaves. Only ever made by [`build`], or by tests that checked them, so that children are in range.

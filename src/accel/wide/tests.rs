@@ -5,7 +5,6 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use super::collapse::Collapse;
-use super::simd::Level;
 use super::*;
 use crate::accel::leaf::LeafTriangle;
 use crate::accel::topology::Topology;
@@ -13,6 +12,7 @@ use crate::accel::{Bvh2, Kind, Linear};
 use crate::geometry::Ray;
 use crate::geometry::triangle::hit_bounds;
 use crate::math::random::Random;
+use crate::math::simd::Level;
 use crate::progress::Silent;
 
 fn soup(triangles: impl IntoIterator<Item = [Vec3; 3]>) -> Arc<TriangleMesh> {

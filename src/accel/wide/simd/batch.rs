@@ -82,7 +82,7 @@ pub fn closest_batch(level: Level, tree: &Tree, rays: &[Ray], clips: &[Interval]
     assert!(rays.len() == best.len() && (clips.is_empty() || clips.len() == rays.len()), "one of each a ray");
     // SAFETY: the processor has the level's instructions, and the tree's children are in range.
     unsafe {
-        match level.0 {
+        match level.set() {
             Set::Portable => closest::<Portable>(tree, rays, clips, instance, best),
             #[cfg(target_arch = "x86_64")]
             Set::Avx2 => closest_avx2(tree, rays, clips, instance, best),
@@ -98,7 +98,7 @@ pub fn occluded_batch(level: Level, tree: &Tree, rays: &[Ray], clips: &[Interval
     assert!(rays.len() == found.len() && (clips.is_empty() || clips.len() == rays.len()), "one of each a ray");
     // SAFETY: as above.
     unsafe {
-        match level.0 {
+        match level.set() {
             Set::Portable => occluded::<Portable>(tree, rays, clips, found),
             #[cfg(target_arch = "x86_64")]
             Set::Avx2 => occluded_avx2(tree, rays, clips, found),

@@ -20,8 +20,6 @@ pub use batch::{closest_batch, occluded_batch};
 pub use memory::prefer_huge_pages;
 pub use single::{Closest, NextAfter, Occluded, search, search_alone};
 
-use std::sync::OnceLock;
-
 use packet::Packet;
 use portable::Portable;
 use single::Query;
@@ -30,68 +28,7 @@ use super::Tree;
 
 use crate::geometry::ray::Interval;
 use crate::geometry::{PreparedRay, Ray};
-
-/// The environment variable that forces an instruction set: `portable`, `avx2` or `avx512`.
-pub const VARIABLE: &str = "WHITTED_SIMD";
-
-/// An instruction set that this processor has.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Level(Set);
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Set {
-    Portable,
-    #[cfg(target_arch = "x86_64")]
-    Avx2,
-    #[cfg(target_arch = "x86_64")]
-    Avx512,
-}
-
-impl Level {
-    /// What any processor can do.
-    pub const PORTABLE: Self = Self(Set::Portable);
-
-    /// Every set that this processor has, the best last.
-    pub fn available() -> impl Iterator<Item = Self> {
-        let sets = [
-            Some(Set::Portable),
-            #[cfg(target_arch = "x86_64")]
-            (is_x86_feature_detected!("avx2")
-                && is_x86_feature_detected!("bmi1")
-                && is_x86_feature_detected!("popcnt"))
-            .then_some(Set::Avx2),
-            #[cfg(target_arch = "x86_64")]
-            (is_x86_feature_detected!("avx512f")
-                && is_x86_feature_detected!("avx512vl")
-                && is_x86_feature_detected!("avx512dq")
-                && is_x86_feature_detected!("bmi1")
-                && is_x86_feature_detected!("popcnt"))
-            .then_some(Set::Avx512),
-        ];
-        sets.into_iter().flatten().map(Self)
-    }
-
-    /// The set named by [`VARIABLE`] if this processor has it, else the best. Looked up once.
-    pub fn chosen() -> Self {
-        static CHOSEN: OnceLock<Level> = OnceLock::new();
-        *CHOSEN.get_or_init(|| {
-            let wanted = std::env::var(VARIABLE).unwrap_or_default();
-            let named = Self::available().find(|level| level.name() == wanted);
-            named.or(Self::available().last()).unwrap_or(Self::PORTABLE)
-        })
-    }
-
-    /// What the set is called in reports and in [`VARIABLE`].
-    pub fn name(self) -> &'static str {
-        match self.0 {
-            Set::Portable => "portable",
-            #[cfg(target_arch = "x86_64")]
-            Set::Avx2 => "avx2",
-            #[cfg(target_arch = "x86_64")]
-            Set::Avx512 => "avx512",
-        }
-    }
-}
+use crate::math::simd::{Level, Set};
 
 /// Eight f32 and what searches do with them.
 ///

@@ -117,7 +117,7 @@ impl Query for Occluded {
 pub fn search<Q: Query>(level: Level, tree: &Tree, ray: &PreparedRay, query: &mut Q) {
     // SAFETY: the processor has the level's instructions, and the tree's children are in range.
     unsafe {
-        match level.0 {
+        match level.set() {
             Set::Portable => walk::<Portable, Q>(tree, ray, query),
             #[cfg(target_arch = "x86_64")]
             Set::Avx2 => walk_avx2(tree, ray, query),
@@ -133,7 +133,7 @@ pub fn search<Q: Query>(level: Level, tree: &Tree, ray: &PreparedRay, query: &mu
 pub fn search_alone<Q: Query>(level: Level, tree: &Tree, ray: &Ray, query: &mut Q) {
     // SAFETY: as above.
     unsafe {
-        match level.0 {
+        match level.set() {
             Set::Portable => prepare_and_walk::<Portable, Q>(tree, ray, None, query),
             #[cfg(target_arch = "x86_64")]
             Set::Avx2 => prepare_and_walk_avx2(tree, ray, query),
