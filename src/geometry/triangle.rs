@@ -146,16 +146,41 @@ pub fn hit_bounds(corners: [Vec3; 3]) -> Bounds {
     Bounds { min: min.into(), max: max.into() }
 }
 
+/// The same number by number, for loops that become vectors.
+#[inline(always)]
+pub fn hit_bounds_by_number([a, b, c]: [Vec3; 3]) -> Bounds {
+    let lesser = |a: f32, b: f32| if a < b { a } else { b };
+    let greater = |a: f32, b: f32| if a > b { a } else { b };
+    let by_axis = |of: fn(Vec3) -> f32| {
+        let (a, b, c) = (of(a), of(b), of(c));
+        (lesser(lesser(a, b), c), greater(greater(a, b), c))
+    };
+    let ((min_x, max_x), (min_y, max_y), (min_z, max_z)) = (by_axis(|v| v.x), by_axis(|v| v.y), by_axis(|v| v.z));
+    let (x, y, z) = (max_x - min_x, max_y - min_y, max_z - min_z);
+    let margin = greater(z, greater(x, y)) * MARGIN + LEAST_MARGIN;
+    let grown = |min: f32, max: f32, extent: f32| {
+        let (lower, upper) = (min - (margin + min.abs() * STEP), max + (margin + max.abs() * STEP));
+        if extent == 0.0 { (min, max) } else { (lower, upper) }
+    };
+    let (x, y, z) = (grown(min_x, max_x, x), grown(min_y, max_y, y), grown(min_z, max_z, z));
+    Bounds { min: Vec3::new(x.0, y.0, z.0), max: Vec3::new(x.1, y.1, z.1) }
+}
+
+/// What the boxes of hits are enlarged by, in parts of the largest extent. Rounding of the sum is at most u of the coordinate: [`STEP`] of
+/// it beside the margin cover that and, where the margin is finer than the coordinates, make a step. The least numbers stand in for both
+/// where they underflow.
+const MARGIN: f32 = 8.0 * UNIT_ROUNDOFF as f32;
+const LEAST_MARGIN: f32 = f32::from_bits(8);
+const STEP: f32 = 1.5 * UNIT_ROUNDOFF as f32;
+
 #[inline(always)]
 fn hit_corners([a, b, c]: [Vec3A; 3]) -> [Vec3A; 2] {
     let (min, max) = (a.min(b).min(c), a.max(b).max(c));
     let extent = max - min;
     let largest = if extent.x > extent.y { extent.x } else { extent.y };
     let largest = if extent.z > largest { extent.z } else { largest };
-    // The rounding of the sum is at most u of the coordinate: 1.5 u of it beside the margin cover that and, where the margin
-    // is finer than the coordinates, make a step. The least numbers stand in for both where they underflow.
-    let margin = Vec3A::splat(largest * (8.0 * UNIT_ROUNDOFF as f32) + f32::from_bits(8));
-    let step = Vec3A::splat(1.5 * UNIT_ROUNDOFF as f32);
+    let margin = Vec3A::splat(largest * MARGIN + LEAST_MARGIN);
+    let step = Vec3A::splat(STEP);
     let flat = extent.cmpeq(Vec3A::ZERO);
     [
         Vec3A::select(flat, min, min - (margin + min.abs() * step)),

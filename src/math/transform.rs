@@ -71,13 +71,13 @@ impl Transform {
     }
 
     /// A point from object to world space.
-    #[inline]
+    #[inline(always)]
     pub fn point_to_world(&self, p: DVec3) -> DVec3 {
         point(&self.to_world, p)
     }
 
     /// A direction from object to world space, not normalised.
-    #[inline]
+    #[inline(always)]
     pub fn vector_to_world(&self, v: DVec3) -> DVec3 {
         apply(&self.to_world.matrix3, v)
     }
@@ -85,13 +85,13 @@ impl Transform {
     /// A point from world to object space.
     ///
     /// The translation goes first: between a point and an object far away the difference is exact where products are not.
-    #[inline]
+    #[inline(always)]
     pub fn point_to_object(&self, p: DVec3) -> DVec3 {
         apply(&self.to_object.matrix3, p - self.to_world.translation)
     }
 
     /// A direction from world to object space, not normalised: t is the same in both spaces.
-    #[inline]
+    #[inline(always)]
     pub fn vector_to_object(&self, v: DVec3) -> DVec3 {
         apply(&self.to_object.matrix3, v)
     }
@@ -99,7 +99,7 @@ impl Transform {
     /// A normal from object to world space by the inverse transpose, not normalised.
     ///
     /// The orientation follows the surface: outward stays outward under a mirror too.
-    #[inline]
+    #[inline(always)]
     pub fn normal_to_world(&self, n: DVec3) -> DVec3 {
         let m = &self.to_object.matrix3;
         DVec3::new(dot(m.x_axis, n), dot(m.y_axis, n), dot(m.z_axis, n))

@@ -7,10 +7,13 @@ use glam::{DVec3, Vec3};
 
 use crate::geometry::{Hit, Key, Ray};
 use crate::math::float::{gamma, round_down};
+use crate::math::simd::{Level, Task};
 use crate::math::vector::length;
 use crate::render::intersect::Intersect;
-use crate::render::shadow::Illumination;
-use crate::render::surface::SurfacePoint;
+use crate::render::lanes::{LANES, Vectors32, whole_rows};
+use crate::render::points::{Found, Points};
+use crate::render::shadow::{Illumination, Illuminations};
+use crate::render::surface::{SurfacePoint, moved_off};
 use crate::render::trace::TracedRay;
 use crate::scene::camera::ViewRay;
 
@@ -23,6 +26,26 @@ pub struct Meeting<'a> {
     pub hit: &'a Hit,
     /// The point.
     pub point: &'a SurfacePoint,
+}
+
+/// Points on surfaces, and how they were met.
+#[derive(Clone, Copy)]
+pub struct Meetings<'a> {
+    /// The unrounded rays of all.
+    pub(super) views: &'a [ViewRay],
+    /// Which of them found what.
+    pub(super) found: &'a Found,
+    /// The points.
+    pub(super) points: &'a Points,
+}
+
+impl Meetings<'_> {
+    /// Does something with one of them.
+    #[inline(always)]
+    pub(super) fn with<T>(&self, at: usize, work: impl FnOnce(&Meeting<'_>) -> T) -> T {
+        let (view, hit) = (&self.views[self.found.rays[at] as usize], &self.found.hits[at]);
+        work(&Meeting { view, hit, point: &self.points.get(at) })
+    }
 }
 
 /// What forms rays and answers them.
@@ -41,6 +64,15 @@ pub trait Answers: Sync {
 
     /// The ray from a point to a light, which ends just before the light.
     fn shadow_ray(&self, from: &Meeting<'_>, illumination: &Illumination) -> Self::Ray;
+
+    /// [`shadow_ray`](Self::shadow_ray) for each point that a light shines at, in their order.
+    fn shadow_rays(&self, from: &Meetings<'_>, illuminations: &Illuminations, rays: &mut Vec<Self::Ray>) {
+        for at in 0..from.found.count {
+            if let Some(illumination) = illuminations.get(at) {
+                rays.push(from.with(at, |here| self.shadow_ray(here, &illumination)));
+            }
+        }
+    }
 
     /// The first hit in the order of [`Key`].
     fn first_hit(&self, ray: &Self::Ray) -> Hit;
@@ -95,15 +127,20 @@ impl<I: Intersect> Answers for I {
     /// Its direction has any length. The light's place is rounded to f32, as vertices are.
     #[inline(always)]
     fn shadow_ray(&self, from: &Meeting<'_>, illumination: &Illumination) -> Ray {
-        let origin = from.point.origin_outside();
-        let (direction, t_max) = match illumination.position {
-            None => (illumination.to_light, f32::INFINITY),
-            Some(position) => {
-                let (offset, end) = towards(position.as_vec3().as_dvec3(), origin.as_dvec3());
-                (offset, round_down(end))
-            }
-        };
-        Ray { origin, t_min: SPAWNED_T_MIN, direction: direction.as_vec3(), t_max }
+        shadow_ray(from.point.origin_outside(), illumination.to_light, illumination.position)
+    }
+
+    fn shadow_rays(&self, from: &Meetings<'_>, illuminations: &Illuminations, rays: &mut Vec<Ray>) {
+        let count = from.found.count;
+        let mut formed = Formed { origin: Vectors32::ZERO, direction: Vectors32::ZERO, t_max: [0.0; LANES] };
+        let (lanes, points) = (whole_rows(count), from.points);
+        Level::chosen().run(ShadowRays { lanes, points, illuminations, formed: &mut formed });
+        rays.extend((0..count).filter(|&at| illuminations.is_lit[at] != 0).map(|at| Ray {
+            origin: formed.origin.get(at),
+            t_min: SPAWNED_T_MIN,
+            direction: formed.direction.get(at),
+            t_max: formed.t_max[at],
+        }));
     }
 
     #[inline(always)]
@@ -133,6 +170,60 @@ impl<I: Intersect> Answers for I {
         let mut hit = self.next_transmissive_after(ray, Key::BEFORE_ALL);
         while hit.is_hit() && visit(&hit) {
             hit = self.next_transmissive_after(ray, hit.key());
+        }
+    }
+}
+
+/// The ray from a point that was moved off a surface to a light.
+#[inline(always)]
+fn shadow_ray(origin: Vec3, to_light: DVec3, light: Option<DVec3>) -> Ray {
+    let (direction, t_max) = match light {
+        None => (to_light, f32::INFINITY),
+        Some(position) => {
+            let (offset, end) = towards(position.as_vec3().as_dvec3(), origin.as_dvec3());
+            (offset, round_down(end))
+        }
+    };
+    Ray { origin, t_min: SPAWNED_T_MIN, direction: direction.as_vec3(), t_max }
+}
+
+/// Rays number by number.
+struct Formed {
+    origin: Vectors32,
+    direction: Vectors32,
+    t_max: [f32; LANES],
+}
+
+struct ShadowRays<'a> {
+    lanes: usize,
+    points: &'a Points,
+    illuminations: &'a Illuminations,
+    formed: &'a mut Formed,
+}
+
+impl Task for ShadowRays<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        // Known to the compiler in each of these, so that the loops have no branches.
+        match self.illuminations.position {
+            None => self.each(None),
+            Some(position) => self.each(Some(position)),
+        }
+    }
+}
+
+impl ShadowRays<'_> {
+    #[inline(always)]
+    fn each(self, light: Option<DVec3>) {
+        let Self { lanes, points, illuminations, formed } = self;
+        for at in 0..lanes.min(LANES) {
+            let origin = moved_off(points.position.get(at), points.geometric_normal.get(at), points.offset[at]);
+            let ray = shadow_ray(origin, illuminations.to_light.get(at), light);
+            formed.origin.set(at, ray.origin);
+            formed.direction.set(at, ray.direction);
+            formed.t_max[at] = ray.t_max;
         }
     }
 }

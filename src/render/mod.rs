@@ -12,6 +12,8 @@ pub mod answers;
 mod chunk;
 pub mod film;
 pub mod intersect;
+mod lanes;
+mod points;
 pub mod ray_tracing;
 pub mod renderer;
 pub mod sampling;

@@ -49,7 +49,7 @@ impl<I: Answers> Tracer<'_, I> {
             let Some(illumination) = Illumination::at(light, point) else { continue };
             let visible = self.visibility(&here, &illumination);
             if visible != Rgb::ZERO {
-                color += self.lit(visible, &illumination, &colors, point, view);
+                color += self.lit(visible, &illumination, colors.diffuse, point, view);
             }
         }
 
@@ -88,15 +88,15 @@ impl<I: Answers> Tracer<'_, I> {
         &self,
         visible: Rgb,
         illumination: &Illumination,
-        colors: &SurfaceColors,
+        diffuse: Rgb,
         point: &SurfacePoint,
         view: &ViewRay,
     ) -> Rgb {
         let material = &self.scene.materials[point.material as usize];
         if self.is_opaque() {
-            return illumination.color * direct(material, colors.diffuse, point, view, illumination);
+            return illumination.color * direct(material, diffuse, point, view, illumination);
         }
-        let diffuse = (Rgb::ONE - material.kt) * colors.diffuse;
+        let diffuse = (Rgb::ONE - material.kt) * diffuse;
         visible * illumination.color * direct(material, diffuse, point, view, illumination)
     }
 
@@ -109,9 +109,21 @@ impl<I: Answers> Tracer<'_, I> {
     /// The colours of the point that `hit` found.
     #[inline(always)]
     pub fn colors(&self, point: &SurfacePoint, hit: &Hit) -> SurfaceColors {
-        let material = &self.scene.materials[point.material as usize];
+        self.material_colors(&self.scene.materials[point.material as usize], || (*point, *hit))
+    }
+
+    /// The colours of a material at the point that a hit found, which is asked for only if there is an image.
+    #[inline(always)]
+    pub(super) fn material_colors(
+        &self,
+        material: &Material,
+        point: impl FnOnce() -> (SurfacePoint, Hit),
+    ) -> SurfaceColors {
         let diffuse = match &material.diffuse_texture {
-            Some(reference) if compiled::TEXTURES => material.diffuse * self.texel(reference, point, hit),
+            Some(reference) if compiled::TEXTURES => {
+                let (point, hit) = point();
+                material.diffuse * self.texel(reference, &point, &hit)
+            }
             _ => material.diffuse,
         };
         let ambient = material.ambient.unwrap_or(self.scene.ambient * diffuse);
@@ -151,7 +163,7 @@ impl<I: Answers> Tracer<'_, I> {
 #[inline(always)]
 fn direct(material: &Material, diffuse: Rgb, point: &SurfacePoint, view: &ViewRay, illumination: &Illumination) -> Rgb {
     let n_dot_l = illumination.n_dot_l;
-    let mut sum = diffuse * (n_dot_l as f32);
+    let mut sum = diffused(diffuse, n_dot_l);
     if material.ks != Rgb::ZERO {
         let reflected = point.normal * (2.0 * n_dot_l) - illumination.to_light;
         let r_dot_v = -dot(reflected, view.direction);
@@ -160,6 +172,12 @@ fn direct(material: &Material, diffuse: Rgb, point: &SurfacePoint, view: &ViewRa
         }
     }
     sum
+}
+
+/// `D (N.L)`
+#[inline(always)]
+pub(super) fn diffused(diffuse: Rgb, n_dot_l: f64) -> Rgb {
+    diffuse * (n_dot_l as f32)
 }
 
 /// `x^n` for x in (0, 1]; whole exponents by repeated squaring, others by `libm`. At most 1: R.V of unit vectors may

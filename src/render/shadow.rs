@@ -3,9 +3,12 @@
 use glam::DVec3;
 
 use crate::error::{Error, Result};
+use crate::math::simd::{Level, Task};
 use crate::math::vector::{dot, normalize};
 use crate::render::answers::{Answers, Meeting};
-use crate::render::surface::SurfacePoint;
+use crate::render::lanes::{Flags, LANES, Numbers, Vectors, Vectors32, whole_rows};
+use crate::render::points::Points;
+use crate::render::surface::{SAFE, SurfacePoint};
 use crate::render::trace::Tracer;
 use crate::scene::{Falloff, Light, LightKind, Rgb};
 
@@ -26,27 +29,21 @@ pub struct Illumination {
 #[derive(Debug, Clone, Copy)]
 pub struct PreparedLight {
     color: DVec3,
-    source: Source,
+    /// Where it is; infinitely far away the unit vector towards it.
+    place: DVec3,
+    is_distant: bool,
+    falloff: Falloff,
+    cone: Option<Cone>,
 }
 
+/// Where a spot shines.
 #[derive(Debug, Clone, Copy)]
-enum Source {
-    /// Infinitely far away, in this unit direction.
-    Directional {
-        to_light: DVec3,
-    },
-    Point {
-        position: DVec3,
-        falloff: Falloff,
-    },
-    /// `axis` is the unit vector from the light along the cone; the angles are given by their cosines.
-    Spot {
-        position: DVec3,
-        axis: DVec3,
-        inner: f64,
-        outer: f64,
-        falloff: Falloff,
-    },
+struct Cone {
+    /// Unit vector from the light.
+    axis: DVec3,
+    /// Cosines of the angles within which it is as bright as anywhere, and beyond which there is no light.
+    inner: f64,
+    outer: f64,
 }
 
 impl PreparedLight {
@@ -58,18 +55,68 @@ impl PreparedLight {
         let unit = |direction: DVec3| {
             normalize(direction).ok_or_else(|| Error::caller(format!("light `{}` has no direction", light.name)))
         };
-        let source = match light.kind {
-            LightKind::Directional { direction } => Source::Directional { to_light: unit(-direction)? },
-            LightKind::Point { position, falloff } => Source::Point { position: position - scene_origin, falloff },
-            LightKind::Spot { position, direction, inner_angle, outer_angle, falloff } => Source::Spot {
-                position: position - scene_origin,
-                axis: unit(direction)?,
-                inner: libm::cos(inner_angle),
-                outer: libm::cos(outer_angle),
-                falloff,
-            },
+        let at = |place: DVec3, falloff: Falloff, cone: Option<Cone>| {
+            let place = place - scene_origin;
+            Self { color: light.color.as_dvec3(), place, is_distant: false, falloff, cone }
         };
-        Ok(Self { color: light.color.as_dvec3(), source })
+        Ok(match light.kind {
+            LightKind::Directional { direction } => {
+                let place = unit(-direction)?;
+                Self { place, is_distant: true, ..at(place, Falloff::None, None) }
+            }
+            LightKind::Point { position, falloff } => at(position, falloff, None),
+            LightKind::Spot { position, direction, inner_angle, outer_angle, falloff } => {
+                let (inner, outer) = (libm::cos(inner_angle), libm::cos(outer_angle));
+                at(position, falloff, Some(Cone { axis: unit(direction)?, inner, outer }))
+            }
+        })
+    }
+
+    /// Where it is, in the renderer's world; `None` if infinitely far away.
+    pub fn position(&self) -> Option<DVec3> {
+        (!self.is_distant).then_some(self.place)
+    }
+
+    /// The vector from a point to the light, of any length; and whether it can be told from none.
+    ///
+    /// Within some roundings of f64 a light and a point cannot be told apart: on which side of the surface the light is would be
+    /// chance, and its inverse square without limit.
+    #[inline(always)]
+    fn offset(&self, position: DVec3) -> (DVec3, bool) {
+        if self.is_distant {
+            return (self.place, true);
+        }
+        let offset = self.place - position;
+        let largest = |v: DVec3| {
+            let v = v.abs();
+            let larger = if v.x > v.y { v.x } else { v.y };
+            if v.z > larger { v.z } else { larger }
+        };
+        (offset, largest(offset) > 64.0 * f64::EPSILON * largest(self.place))
+    }
+
+    /// What the light sends along a unit vector to it, over a distance of which the square is given, to where the normal is; and
+    /// whether that is any.
+    #[inline(always)]
+    fn shine(&self, to_light: DVec3, squared: f64, normal: DVec3) -> (f64, Rgb, bool) {
+        let mut strength = match self.falloff {
+            Falloff::None => 1.0,
+            Falloff::InverseSquare => 1.0 / squared,
+        };
+        let mut shines = true;
+        if let Some(Cone { axis, inner, outer }) = self.cone {
+            // glTF's KHR_lights_punctual: the square of a linear ramp in the cosine.
+            let cosine = -dot(to_light, axis);
+            let share = (cosine - outer) / (inner - outer);
+            strength *= if cosine >= inner { 1.0 } else { share * share };
+            shines = (cosine >= inner) | (share > 0.0);
+        }
+        let n_dot_l = dot(normal, to_light);
+        let color = (self.color * strength).as_vec3();
+        // Closer to an inverse-square light than f32 can tell there is no brightness to speak of.
+        let is_finite = |x: f32| x.abs() < f32::INFINITY;
+        let is_lit = shines & (n_dot_l > 0.0) & is_finite(color.x) & is_finite(color.y) & is_finite(color.z);
+        (n_dot_l, color, is_lit)
     }
 }
 
@@ -77,48 +124,115 @@ impl Illumination {
     /// What `light` sends to a point; `None` where N.L is not positive, the light is at the point or its brightness
     /// there overflows, or the point lies outside its cone: then no shadow ray is traced.
     pub fn at(light: &PreparedLight, point: &SurfacePoint) -> Option<Self> {
-        let (to_light, strength, position) = match light.source {
-            Source::Directional { to_light } => (to_light, 1.0, None),
-            Source::Point { position, falloff } => {
-                let (to_light, strength) = from_point(position, falloff, point)?;
-                (to_light, strength, Some(position))
-            }
-            Source::Spot { position, axis, inner, outer, falloff } => {
-                let (to_light, strength) = from_point(position, falloff, point)?;
-                (to_light, strength * cone(-dot(to_light, axis), inner, outer)?, Some(position))
-            }
-        };
-        let n_dot_l = dot(point.normal, to_light);
-        // Closer to an inverse-square light than f32 can tell there is no brightness to speak of.
-        let color = (light.color * strength).as_vec3();
-        (n_dot_l > 0.0 && color.is_finite()).then_some(Self { to_light, n_dot_l, color, position })
+        let (offset, is_apart) = light.offset(point.position);
+        if !is_apart {
+            return None;
+        }
+        let to_light = if light.is_distant { offset } else { normalize(offset)? };
+        let (n_dot_l, color, is_lit) = light.shine(to_light, dot(offset, offset), point.normal);
+        is_lit.then_some(Self { to_light, n_dot_l, color, position: light.position() })
     }
 }
 
-/// Direction and strength of a light at a point; `None` for a light that is where the point is.
-///
-/// Within some roundings of f64 the two cannot be told apart: on which side of the surface the light is would be chance,
-/// and its inverse square without limit.
-fn from_point(position: DVec3, falloff: Falloff, point: &SurfacePoint) -> Option<(DVec3, f64)> {
-    let offset = position - point.position;
-    if offset.abs().max_element() <= 64.0 * f64::EPSILON * position.abs().max_element() {
-        return None;
-    }
-    let strength = match falloff {
-        Falloff::None => 1.0,
-        Falloff::InverseSquare => 1.0 / dot(offset, offset),
+/// What one light would send to many points.
+pub struct Illuminations {
+    pub(super) to_light: Vectors,
+    pub(super) n_dot_l: Numbers,
+    pub(super) color: Vectors32,
+    /// Where that is any; elsewhere the rest has no meaning.
+    pub(super) is_lit: Flags,
+    /// Where the light is; `None` if infinitely far away.
+    pub(super) position: Option<DVec3>,
+}
+
+impl Illuminations {
+    /// None.
+    pub const NONE: Self = Self {
+        to_light: Vectors::ZERO,
+        n_dot_l: [0.0; LANES],
+        color: Vectors32::ZERO,
+        is_lit: [0; LANES],
+        position: None,
     };
-    Some((normalize(offset)?, strength))
+
+    /// [`Illumination::at`] for each of some points.
+    pub fn find(&mut self, level: Level, light: &PreparedLight, points: &Points, count: usize) {
+        self.position = light.position();
+        let lanes = whole_rows(count);
+        let mut odd = [0; LANES];
+        level.run(Illuminate { lanes, light, points, found: self, odd: &mut odd });
+        for at in (0..count).filter(|&at| odd[at] != 0) {
+            let one = Illumination::at(light, &points.get(at));
+            self.is_lit[at] = u32::from(one.is_some());
+            if let Some(one) = one {
+                self.to_light.set(at, one.to_light);
+                self.n_dot_l[at] = one.n_dot_l;
+                self.color.set(at, one.color);
+            }
+        }
+    }
+
+    /// One of them.
+    #[inline(always)]
+    pub fn get(&self, at: usize) -> Option<Illumination> {
+        let (to_light, n_dot_l, color) = (self.to_light.get(at), self.n_dot_l[at], self.color.get(at));
+        (self.is_lit[at] != 0).then_some(Illumination { to_light, n_dot_l, color, position: self.position })
+    }
 }
 
-/// The share of a spot's light at an angle to its axis, all angles given by their cosines: glTF's
-/// KHR_lights_punctual, the square of a linear ramp in the cosine. `None` outside the cone.
-fn cone(cosine: f64, inner: f64, outer: f64) -> Option<f64> {
-    if cosine >= inner {
-        return Some(1.0);
+struct Illuminate<'a> {
+    lanes: usize,
+    light: &'a PreparedLight,
+    points: &'a Points,
+    found: &'a mut Illuminations,
+    odd: &'a mut Flags,
+}
+
+impl Task for Illuminate<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        // What does not depend on the point is a constant in each of these, so that the loops have no branches.
+        let light = *self.light;
+        match (light.is_distant, light.falloff, light.cone) {
+            (true, ..) => {
+                self.each(PreparedLight { is_distant: true, falloff: Falloff::None, cone: None, ..light });
+            }
+            (_, Falloff::None, None) => {
+                self.each(PreparedLight { is_distant: false, falloff: Falloff::None, cone: None, ..light });
+            }
+            (_, Falloff::InverseSquare, None) => {
+                self.each(PreparedLight { is_distant: false, falloff: Falloff::InverseSquare, cone: None, ..light });
+            }
+            (_, Falloff::None, Some(cone)) => {
+                self.each(PreparedLight { is_distant: false, falloff: Falloff::None, cone: Some(cone), ..light });
+            }
+            (_, Falloff::InverseSquare, Some(cone)) => {
+                let falloff = Falloff::InverseSquare;
+                self.each(PreparedLight { is_distant: false, falloff, cone: Some(cone), ..light });
+            }
+        }
     }
-    let share = (cosine - outer) / (inner - outer);
-    (share > 0.0).then_some(share * share)
+}
+
+impl Illuminate<'_> {
+    #[inline(always)]
+    fn each(self, light: PreparedLight) {
+        let Self { lanes, points, found, odd, .. } = self;
+        for at in 0..lanes.min(LANES) {
+            let (offset, is_apart) = light.offset(points.position.get(at));
+            let squared = dot(offset, offset);
+            let is_regular = light.is_distant | (squared >= SAFE.start) & (squared < SAFE.end);
+            let to_light = if light.is_distant { offset } else { offset / squared.sqrt() };
+            let (n_dot_l, color, is_lit) = light.shine(to_light, squared, points.normal.get(at));
+            found.to_light.set(at, to_light);
+            found.n_dot_l[at] = n_dot_l;
+            found.color.set(at, color);
+            found.is_lit[at] = u32::from(is_apart & is_lit);
+            odd[at] = u32::from(is_apart & !is_regular);
+        }
+    }
 }
 
 impl<I: Answers> Tracer<'_, I> {

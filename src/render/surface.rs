@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DVec2, DVec3, Vec3};
 
-use crate::geometry::triangle::hit_bounds;
+use crate::geometry::triangle::hit_bounds_by_number;
 use crate::geometry::{Bounds, Hit, Quadric};
 use crate::math::Transform;
 use crate::math::float::{gamma, round_down, round_up};
@@ -25,13 +25,13 @@ pub struct SurfacePoint {
     /// Position of the material in the scene's list.
     pub material: u32,
     /// How far intersections with this surface may be off along its normal.
-    offset: f64,
-    place: Place,
+    pub(super) offset: f64,
+    pub(super) place: Place,
 }
 
 /// Where a point is on its own surface.
 #[derive(Debug, Clone, Copy)]
-enum Place {
+pub(super) enum Place {
     /// The weights of a triangle's corners.
     Weights([f64; 3]),
     /// A quadric's point in object space.
@@ -61,23 +61,13 @@ impl SurfacePoint {
         match instance.shape {
             Shape::Mesh(mesh) => {
                 let mesh = &scene.meshes[mesh as usize];
-                let corners = mesh.triangle(hit.primitive).map(|p| p.as_dvec3());
-                let weights = refined_weights(instance, ray, hit, corners);
-                let [_, wb, wc] = weights;
-                let [a, b, c] = corners;
-                // From one corner, so that a triangle in a plane along two axes has its points exactly there.
-                let position = a + (b - a) * wb + (c - a) * wc;
-                let face = normal_and_length(cross(b - a, c - a));
-                let error = face.map_or(0.0, |face| test_error(position, weights, corners, face));
-                let normal = face.map(|(normal, _)| normal);
-                let local = LocalPoint { position, normal, error, from_outside: None, place: Place::Weights(weights) };
-                let mut point = Self::placed(instance, ray, local, material);
+                let mut point = Self::on_triangle(instance, ray, hit, mesh.triangle(hit.primitive), material);
                 if compiled::NORMALS
                     && let Some(normals) = &mesh.normals
                     && !scene.materials[material as usize].flat
                 {
                     let corners = mesh.indices[hit.primitive as usize].map(|i| normals[i as usize]);
-                    point.set_shading_normal(instance, corners, weights);
+                    point.set_shading_normal(instance, corners);
                 }
                 point
             }
@@ -86,6 +76,35 @@ impl SurfacePoint {
                 Self::on_quadric(&scene.quadrics[quadric as usize], instance, ray, hit, material)
             }
         }
+    }
+
+    #[inline(always)]
+    fn on_triangle(instance: &Instance, ray: &ViewRay, hit: &Hit, corners: [Vec3; 3], material: u32) -> Self {
+        let uv = [hit.u, hit.v];
+        let (solved, is_regular) = if instance.is_unmoved() {
+            solve::<false>(&instance.transform, ray, uv, corners)
+        } else {
+            solve::<true>(&instance.transform, ray, uv, corners)
+        };
+        if is_regular {
+            solved.point(material)
+        } else {
+            Self::on_extreme_triangle(instance, ray, hit, corners, material)
+        }
+    }
+
+    /// The same where a normal has no length, or one whose square f64 does not hold.
+    #[cold]
+    fn on_extreme_triangle(instance: &Instance, ray: &ViewRay, hit: &Hit, corners: [Vec3; 3], material: u32) -> Self {
+        let (origin, direction) = instance.local_line(ray.origin, ray.direction);
+        let [a, b, c] = corners.map(|corner| corner.as_dvec3());
+        let weights = refined_weights(origin, direction, [hit.u, hit.v], [a, b, c]);
+        let position = at_weights([a, b, c], weights);
+        let face = normal_and_length(cross(b - a, c - a));
+        let error = face.map_or(0.0, |face| test_error(position, weights, corners, face));
+        let normal = face.map(|(normal, _)| normal);
+        let local = LocalPoint { position, normal, error, from_outside: None, place: Place::Weights(weights) };
+        Self::placed(instance, ray, local, material)
     }
 
     /// Kept out of the function above, which is smaller and faster without it where there are only meshes.
@@ -125,14 +144,12 @@ impl SurfacePoint {
 
     /// Interpolates the corners' normals, of any length, where all are given. Out of line, since meshes without normals need not pay.
     #[inline(never)]
-    fn set_shading_normal(&mut self, instance: &Instance, [a, b, c]: [Vec3; 3], [wa, wb, wc]: [f64; 3]) {
-        if a == Vec3::ZERO || b == Vec3::ZERO || c == Vec3::ZERO {
-            return;
-        }
-        let local = a.as_dvec3() * wa + b.as_dvec3() * wb + c.as_dvec3() * wc;
+    fn set_shading_normal(&mut self, instance: &Instance, corners: [Vec3; 3]) {
+        let Place::Weights(weights) = self.place else { return };
+        let (local, is_given) = interpolated(corners, weights);
         let world = if instance.is_unmoved() { local } else { instance.transform.normal_to_world(local) };
-        if let Some(normal) = normalize(world) {
-            self.normal = if dot(normal, self.geometric_normal) < 0.0 { -normal } else { normal };
+        if let Some(normal) = normalize(world).filter(|_| is_given) {
+            self.normal = on_side_of(normal, self.geometric_normal);
         }
     }
 
@@ -168,22 +185,123 @@ impl SurfacePoint {
     }
 
     fn origin_along(&self, normal: DVec3) -> Vec3 {
-        let moved = self.position + normal * self.offset;
-        let away = |x: f64, n: f64| {
-            if n > 0.0 {
-                round_up(x)
-            } else if n < 0.0 {
-                round_down(x)
-            } else {
-                x as f32
-            }
-        };
-        Vec3::new(away(moved.x, normal.x), away(moved.y, normal.y), away(moved.z, normal.z))
+        moved_off(self.position, normal, self.offset)
     }
+}
+
+/// A point a distance along a normal, rounded to f32 away from where it was.
+#[inline(always)]
+pub(super) fn moved_off(position: DVec3, normal: DVec3, offset: f64) -> Vec3 {
+    let moved = position + normal * offset;
+    let away = |x: f64, n: f64| {
+        let (up, down, nearest) = (round_up(x), round_down(x), x as f32);
+        if n > 0.0 {
+            up
+        } else if n < 0.0 {
+            down
+        } else {
+            nearest
+        }
+    };
+    Vec3::new(away(moved.x, normal.x), away(moved.y, normal.y), away(moved.z, normal.z))
+}
+
+/// A point on a triangle, in the world.
+pub(super) struct Solved {
+    pub position: DVec3,
+    /// Unit normal of the front.
+    pub outward: DVec3,
+    pub from_outside: bool,
+    pub offset: f64,
+    pub weights: [f64; 3],
+}
+
+impl Solved {
+    /// Unit normal on the side that the ray came from.
+    #[inline(always)]
+    pub fn geometric_normal(&self) -> DVec3 {
+        if self.from_outside { self.outward } else { -self.outward }
+    }
+
+    #[inline(always)]
+    fn point(&self, material: u32) -> SurfacePoint {
+        let normal = self.geometric_normal();
+        SurfacePoint {
+            position: self.position,
+            geometric_normal: normal,
+            normal,
+            from_outside: self.from_outside,
+            material,
+            offset: self.offset,
+            place: Place::Weights(self.weights),
+        }
+    }
+}
+
+/// The squares of lengths that can be taken the root of without losing anything.
+pub(super) const SAFE: std::ops::Range<f64> = 1e-200..1e200;
+
+/// Solves for the point where a ray meets a triangle, of an object that is `MOVED` or stands in the world as it is; `uv` are the hit's.
+///
+/// Without a branch, so that a loop over many becomes vectors; where a length leaves [`SAFE`] the second value is false, and the first
+/// is not to be used.
+#[inline(always)]
+pub(super) fn solve<const MOVED: bool>(
+    transform: &Transform,
+    ray: &ViewRay,
+    uv: [f32; 2],
+    corners: [Vec3; 3],
+) -> (Solved, bool) {
+    let mut line = (ray.origin, ray.direction);
+    if MOVED {
+        line = (transform.point_to_object(ray.origin), transform.vector_to_object(ray.direction));
+    }
+    let [a, b, c] = [corners[0].as_dvec3(), corners[1].as_dvec3(), corners[2].as_dvec3()];
+    let weights = refined_weights(line.0, line.1, uv, [a, b, c]);
+    let mut position = at_weights([a, b, c], weights);
+    let face = cross(b - a, c - a);
+    let squared = dot(face, face);
+    let length = squared.sqrt();
+    let mut is_regular = (squared >= SAFE.start) & (squared < SAFE.end);
+    let mut outward = face / length;
+    let mut offset = test_error(position, weights, corners, (outward, length));
+    if MOVED {
+        let error = offset + dot(outward.abs(), there_and_back(transform, position));
+        let normal = transform.normal_to_world(outward);
+        let squared = dot(normal, normal);
+        let length = squared.sqrt();
+        is_regular &= (squared >= SAFE.start) & (squared < SAFE.end);
+        position = transform.point_to_world(position);
+        // Planes a distance 1 apart in object space are 1 / |M^-T n| apart in the world.
+        (outward, offset) = (normal / length, error / length);
+    }
+    let from_outside = dot(outward, -ray.direction) >= 0.0;
+    (Solved { position, outward, from_outside, offset, weights }, is_regular)
+}
+
+/// From one corner, so that a triangle in a plane along two axes has its points exactly there.
+#[inline(always)]
+fn at_weights([a, b, c]: [DVec3; 3], [_, wb, wc]: [f64; 3]) -> DVec3 {
+    a + (b - a) * wb + (c - a) * wc
+}
+
+/// The corners' normals, interpolated, of any length; and whether all are given.
+#[inline(always)]
+pub(super) fn interpolated([a, b, c]: [Vec3; 3], [wa, wb, wc]: [f64; 3]) -> (DVec3, bool) {
+    let is_given = |n: Vec3| (n.x != 0.0) | (n.y != 0.0) | (n.z != 0.0);
+    let local = a.as_dvec3() * wa + b.as_dvec3() * wb + c.as_dvec3() * wc;
+    (local, is_given(a) & is_given(b) & is_given(c))
+}
+
+/// A normal, or its opposite, on the side of another.
+#[inline(always)]
+pub(super) fn on_side_of(normal: DVec3, other: DVec3) -> DVec3 {
+    if dot(normal, other) < 0.0 { -normal } else { normal }
 }
 
 /// What bringing a point of an object to the world and a ray's origin from there back to the object may lose, per axis of
 /// the object: 64 roundings in f64 of all magnitudes that take part.
+#[inline(always)]
 fn there_and_back(transform: &Transform, position: DVec3) -> DVec3 {
     let magnitude = |m: &DAffine3, p: DVec3| {
         m.matrix3.x_axis.abs() * p.x.abs()
@@ -204,32 +322,44 @@ fn there_and_back(transform: &Transform, position: DVec3) -> DVec3 {
 /// an axis-aligned triangle that is no distance at all, and contact shadows stay attached. Two roundings of the point's
 /// coordinates are for the start of a ray that is rounded in the mesh's own space.
 #[inline(always)]
-fn test_error(position: DVec3, weights: [f64; 3], [a, b, c]: [DVec3; 3], (normal, twice_area): (DVec3, f64)) -> f64 {
+fn test_error(position: DVec3, weights: [f64; 3], corners: [Vec3; 3], (normal, twice_area): (DVec3, f64)) -> f64 {
+    let [a, b, c] = [corners[0].as_dvec3(), corners[1].as_dvec3(), corners[2].as_dvec3()];
     let squared = |corner: DVec3| dot(corner - position, corner - position);
-    let reach_squared = squared(a).max(squared(b)).max(squared(c));
+    let reach_squared = larger(larger(squared(a), squared(b)), squared(c));
     // How far the box reaches above and below the triangle's plane.
-    let Bounds { min, max } = hit_bounds([a, b, c].map(|corner| corner.as_vec3()));
+    let Bounds { min, max } = hit_bounds_by_number(corners);
     let (min, max) = (min.as_dvec3(), max.as_dvec3());
     let (half, middle) = (0.5 * (max - min), 0.5 * (max + min));
     let box_reach = dot(normal.abs(), half) + dot(normal, middle - position).abs();
     let place = (a.abs() * weights[0] + b.abs() * weights[1] + c.abs() * weights[2]) * gamma(2);
-    (gamma(4) * reach_squared.sqrt() * (1.0 + reach_squared / twice_area)).min(box_reach) + dot(normal.abs(), place)
+    let reach = gamma(4) * reach_squared.sqrt() * (1.0 + reach_squared / twice_area);
+    (if reach < box_reach { reach } else { box_reach }) + dot(normal.abs(), place)
+}
+
+#[inline(always)]
+fn larger(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
 }
 
 /// The weights of a triangle's corners where the f64 ray meets it, kept inside the triangle.
 ///
 /// Möller and Trumbore's test in f64 serves as a solver here: that the triangle is hit is already decided. A ray that
 /// runs within the plane keeps the weights of the f32 hit.
-fn refined_weights(instance: &Instance, ray: &ViewRay, hit: &Hit, [a, b, c]: [DVec3; 3]) -> [f64; 3] {
-    let (origin, direction) = instance.local_line(ray.origin, ray.direction);
+#[inline(always)]
+fn refined_weights(origin: DVec3, direction: DVec3, uv: [f32; 2], [a, b, c]: [DVec3; 3]) -> [f64; 3] {
     let (ab, ac) = (b - a, c - a);
     let p = cross(direction, ac);
     let determinant = dot(ab, p);
     let from_a = origin - a;
     let u = dot(from_a, p) / determinant;
     let v = dot(direction, cross(from_a, ab)) / determinant;
-    let (u, v) = if u.is_finite() && v.is_finite() { (u, v) } else { (f64::from(hit.u), f64::from(hit.v)) };
-    let u = u.clamp(0.0, 1.0);
-    let v = v.clamp(0.0, 1.0 - u);
+    let is_finite = (u.abs() < f64::INFINITY) & (v.abs() < f64::INFINITY);
+    let (u, v) = if is_finite { (u, v) } else { (f64::from(uv[0]), f64::from(uv[1])) };
+    let within = |x: f64, end: f64| {
+        let x = if x < 0.0 { 0.0 } else { x };
+        if x > end { end } else { x }
+    };
+    let u = within(u, 1.0);
+    let v = within(v, 1.0 - u);
     [1.0 - u - v, u, v]
 }

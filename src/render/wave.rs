@@ -6,14 +6,16 @@
 //! comes where it does in the recursion.
 
 use crate::geometry::Hit;
-use crate::render::answers::{Answers, Meeting};
+use crate::math::simd::{Level, Task};
+use crate::render::answers::{Answers, Meetings};
+use crate::render::lanes::{LANES, Vectors32, whole_rows};
+use crate::render::points::{Found, Points};
 use crate::render::settings::ThreadSeconds;
-use crate::render::shade::SurfaceColors;
-use crate::render::shadow::Illumination;
-use crate::render::surface::SurfacePoint;
+use crate::render::shade::diffused;
+use crate::render::shadow::Illuminations;
 use crate::render::trace::{TracedRay, Tracer, background};
 use crate::scene::camera::ViewRay;
-use crate::scene::{Rgb, compiled};
+use crate::scene::{Rgb, Shape, compiled};
 
 /// Rays that are traced together. More make packets of rays that go alike, but what is known of them leaves the cache.
 pub const LARGEST: usize = 1024;
@@ -24,16 +26,24 @@ struct Rays<R> {
     views: Vec<ViewRay>,
 }
 
-/// A hit that is being shaded.
-struct Shading {
-    /// The number of its ray.
-    ray: u32,
-    hit: Hit,
-    point: SurfacePoint,
-    colors: SurfaceColors,
+/// Hits that are being shaded.
+struct Block {
+    found: Found,
+    /// The hits' instance; [`MIXED`] if they have several, or one that is no mesh.
+    instance: u32,
+    points: Points,
+    /// Od.
+    diffuse: Vectors32,
     /// What has been summed up.
-    color: Rgb,
+    color: Vectors32,
+    /// Whether a material has a highlight.
+    is_glossy: bool,
 }
+
+const MIXED: u32 = u32::MAX;
+
+/// So many instances have blocks of their own at a time.
+const MOST_OPEN: usize = 8;
 
 /// What a ray's colour still lacks.
 struct Pending {
@@ -76,40 +86,47 @@ impl<I: Answers> Tracer<'_, I> {
         let mut hits = vec![Hit::MISS; traced.rays.len()];
         self.timed(traversal, || self.intersect.first_hits(&traced.rays, &mut hits));
         let mut colors = vec![Rgb::ZERO; hits.len()];
-        let mut shadings = Vec::with_capacity(hits.len());
-        for (number, (first, color)) in hits.iter_mut().zip(&mut colors).enumerate() {
-            let (ray, view) = (traced.rays[number], traced.views[number]);
-            if !first.is_hit() {
-                *color = background(&self.scene.background, view.direction);
-                continue;
+        let mut blocks = Blocks::default();
+        for (number, (hit, color)) in hits.iter().zip(&mut colors).enumerate() {
+            if hit.is_hit() {
+                let is_mesh = matches!(self.world.instances[hit.instance as usize].shape, Shape::Mesh(_));
+                blocks.push(if is_mesh { hit.instance } else { MIXED }, number as u32, *hit);
+            } else {
+                *color = background(&self.scene.background, traced.views[number].direction);
             }
-            let (hit, point) = self.meet(&TracedRay { ray, view }, *first);
-            *first = hit;
-            let colors = self.colors(&point, &hit);
-            shadings.push(Shading { ray: number as u32, hit, point, colors, color: colors.ambient });
         }
-        self.add_lights(&traced.views, &mut shadings);
+        let mut blocks = blocks.all;
+        for block in &mut blocks {
+            self.meet_all(&traced, block, &mut hits);
+            self.color_all(block);
+        }
+        self.add_lights(&traced.views, &mut blocks);
 
         // Mirror and transmission.
         let mut next = Rays { rays: Vec::new(), views: Vec::new() };
         let mut pending = Vec::new();
         let deeper = depth < self.scene.film.max_depth;
-        for shading in &shadings {
-            let here = shading.meeting(&traced.views);
-            let material = &self.scene.materials[here.point.material as usize];
-            let reflects = deeper && compiled::REFLECTION && material.is_reflective();
-            let transmits = deeper && !self.is_opaque() && material.is_transmissive();
-            if !reflects && !transmits {
-                colors[shading.ray as usize] = self.clamp(shading.color);
-                continue;
+        for block in &blocks {
+            let meetings = block.meetings(&traced.views);
+            for at in 0..block.found.count {
+                let (ray, color, number) = (block.found.rays[at], block.color.get(at), block.points.materials[at]);
+                let material = &self.scene.materials[number as usize];
+                let reflects = deeper && compiled::REFLECTION && material.is_reflective();
+                let transmits = deeper && !self.is_opaque() && material.is_transmissive();
+                if !reflects && !transmits {
+                    colors[ray as usize] = self.clamp(color);
+                    continue;
+                }
+                colors[ray as usize] = color;
+                meetings.with(at, |here| {
+                    let reflected = reflects.then(|| next.push(self.reflected(here)));
+                    let transmitted = transmits.then(|| next.push(self.transmitted(here, material)));
+                    pending.push(Pending { ray, material: number, reflected, transmitted });
+                });
             }
-            colors[shading.ray as usize] = shading.color;
-            let reflected = reflects.then(|| next.push(self.reflected(&here)));
-            let transmitted = transmits.then(|| next.push(self.transmitted(&here, material)));
-            pending.push(Pending { ray: shading.ray, material: here.point.material, reflected, transmitted });
         }
         // The deepest recursion has this batch's colours and hits on every level, but not the rest.
-        drop((traced, shadings));
+        drop((traced, blocks));
         if !pending.is_empty() {
             let seen = self.trace_all(next, depth + 1);
             for one in pending {
@@ -127,36 +144,156 @@ impl<I: Answers> Tracer<'_, I> {
         (colors, hits)
     }
 
+    /// Finds the points of a block's hits, and corrects hits behind which a ray came in.
+    fn meet_all(&self, traced: &Rays<I::Ray>, block: &mut Block, hits: &mut [Hit]) {
+        let Block { found, points, .. } = block;
+        if block.instance == MIXED {
+            points.solve_each(self.scene, self.world, &traced.views, found);
+        } else {
+            points.solve(Level::chosen(), self.scene, self.world, &traced.views, found);
+        }
+        for at in 0..found.count {
+            if points.from_outside[at] == 0 {
+                let number = found.rays[at] as usize;
+                let ray = TracedRay { ray: traced.rays[number], view: traced.views[number] };
+                if let Some((hit, point)) = self.entry_before(&ray, &found.hits[at], &points.get(at)) {
+                    (found.hits[at], hits[number]) = (hit, hit);
+                    points.set(at, &point);
+                }
+            }
+        }
+    }
+
+    /// Looks up the colours of a block's points.
+    fn color_all(&self, block: &mut Block) {
+        for at in 0..block.found.count {
+            let material = &self.scene.materials[block.points.materials[at] as usize];
+            let point = || block.points.get(at);
+            let colors = self.material_colors(material, || (point(), block.found.hits[at]));
+            block.color.set(at, colors.ambient);
+            block.diffuse.set(at, colors.diffuse);
+            block.is_glossy |= material.ks != Rgb::ZERO;
+        }
+    }
+
     /// Adds each light's diffuse and specular terms where it is seen.
-    fn add_lights(&self, views: &[ViewRay], shadings: &mut [Shading]) {
-        let mut lit: Vec<(u32, Illumination)> = Vec::with_capacity(shadings.len());
-        let mut rays = Vec::with_capacity(shadings.len());
+    fn add_lights(&self, views: &[ViewRay], blocks: &mut [Block]) {
+        let mut illuminations = Vec::new();
+        illuminations.resize_with(blocks.len(), || Illuminations::NONE);
+        let mut rays = Vec::new();
         let mut blocked = Vec::new();
         for light in self.lights() {
-            lit.clear();
             rays.clear();
-            for (number, shading) in shadings.iter().enumerate() {
-                if let Some(illumination) = Illumination::at(light, &shading.point) {
-                    rays.push(self.intersect.shadow_ray(&shading.meeting(views), &illumination));
-                    lit.push((number as u32, illumination));
-                }
+            for (block, illuminations) in blocks.iter().zip(&mut illuminations) {
+                illuminations.find(Level::chosen(), light, &block.points, block.found.count);
+                self.intersect.shadow_rays(&block.meetings(views), illuminations, &mut rays);
             }
             self.count(|counts| counts.shadow += rays.len() as u64);
             blocked.clear();
             blocked.resize(rays.len(), false);
             self.timed(traversal, || self.intersect.are_blocked_by_opaque(&rays, &mut blocked));
-            for (((number, illumination), ray), blocked) in lit.iter().zip(&rays).zip(&blocked) {
-                if *blocked {
-                    continue;
+            let mut answers = rays.iter().zip(&blocked);
+            for (block, illuminations) in blocks.iter_mut().zip(&mut illuminations) {
+                let count = block.found.count;
+                for at in 0..count {
+                    if illuminations.is_lit[at] == 0 {
+                        continue;
+                    }
+                    let (ray, is_blocked) = answers.next().expect("one ray where there is light");
+                    if *is_blocked {
+                        // Until the next light is asked.
+                        illuminations.is_lit[at] = 0;
+                    } else if !self.is_opaque() {
+                        self.add_through(ray, at, views, block, illuminations);
+                    }
                 }
-                let visible = self.visible_through(ray);
-                if self.is_opaque() || visible != Rgb::ZERO {
-                    let shading = &mut shadings[*number as usize];
-                    let view = &views[shading.ray as usize];
-                    shading.color += self.lit(visible, illumination, &shading.colors, &shading.point, view);
+                if self.is_opaque() {
+                    self.add_light(views, block, illuminations);
                 }
             }
         }
+    }
+
+    /// Adds the light of one lamp to a point from which nothing opaque hides it.
+    fn add_through(&self, ray: &I::Ray, at: usize, views: &[ViewRay], block: &mut Block, from: &Illuminations) {
+        let visible = self.visible_through(ray);
+        if let Some(illumination) = from.get(at).filter(|_| visible != Rgb::ZERO) {
+            let (point, view) = (block.points.get(at), &views[block.found.rays[at] as usize]);
+            let more = self.lit(visible, &illumination, block.diffuse.get(at), &point, view);
+            block.color.set(at, block.color.get(at) + more);
+        }
+    }
+
+    /// Adds the light of one lamp to all points that it reaches, in a scene that lets no light through.
+    fn add_light(&self, views: &[ViewRay], block: &mut Block, illuminations: &Illuminations) {
+        let count = block.found.count;
+        if block.is_glossy {
+            for at in (0..count).filter(|&at| illuminations.is_lit[at] != 0) {
+                if let Some(illumination) = illuminations.get(at) {
+                    let (point, view) = (block.points.get(at), &views[block.found.rays[at] as usize]);
+                    let more = self.lit(Rgb::ONE, &illumination, block.diffuse.get(at), &point, view);
+                    block.color.set(at, block.color.get(at) + more);
+                }
+            }
+        } else {
+            let (lanes, diffuse, color) = (whole_rows(count), &block.diffuse, &mut block.color);
+            Level::chosen().run(AddDiffuse { lanes, illuminations, diffuse, color });
+        }
+    }
+}
+
+/// Adds diffuse light where there is any.
+struct AddDiffuse<'a> {
+    lanes: usize,
+    illuminations: &'a Illuminations,
+    diffuse: &'a Vectors32,
+    color: &'a mut Vectors32,
+}
+
+impl Task for AddDiffuse<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { lanes, illuminations, diffuse, color } = self;
+        for at in 0..lanes.min(LANES) {
+            let before = color.get(at);
+            let after = before + illuminations.color.get(at) * diffused(diffuse.get(at), illuminations.n_dot_l[at]);
+            let is_lit = illuminations.is_lit[at] != 0;
+            let pick = |after: f32, before: f32| if is_lit { after } else { before };
+            color.set(at, Rgb::new(pick(after.x, before.x), pick(after.y, before.y), pick(after.z, before.z)));
+        }
+    }
+}
+
+/// Blocks as hits are put into them.
+#[derive(Default)]
+struct Blocks {
+    all: Vec<Block>,
+    /// Of each key the position of the block that has room, or had.
+    open: Vec<(u32, usize)>,
+}
+
+impl Blocks {
+    /// Adds a hit to the block of its instance, or to the mixed one where many have blocks.
+    #[inline(always)]
+    fn push(&mut self, instance: u32, ray: u32, hit: Hit) {
+        let find = |open: &[(u32, usize)], key: u32| open.iter().position(|(of, _)| *of == key);
+        let (key, mut open) = match find(&self.open, instance) {
+            None if self.open.len() >= MOST_OPEN => (MIXED, find(&self.open, MIXED)),
+            found => (instance, found),
+        };
+        let has_room = |at: &usize| !self.all[self.open[*at].1].found.is_full();
+        let block = match open.take_if(|at| has_room(at)) {
+            Some(at) => self.open[at].1,
+            None => {
+                self.open.retain(|(of, _)| *of != key);
+                self.open.push((key, self.all.len()));
+                self.all.push(Block::new(key));
+                self.all.len() - 1
+            }
+        };
+        self.all[block].found.push(ray, hit);
     }
 }
 
@@ -173,8 +310,13 @@ impl<R> Rays<R> {
     }
 }
 
-impl Shading {
-    fn meeting<'a>(&'a self, views: &'a [ViewRay]) -> Meeting<'a> {
-        Meeting { view: &views[self.ray as usize], hit: &self.hit, point: &self.point }
+impl Block {
+    fn new(instance: u32) -> Self {
+        let (diffuse, color) = (Vectors32::ZERO, Vectors32::ZERO);
+        Self { found: Found::NONE, instance, points: Points::NONE, diffuse, color, is_glossy: false }
+    }
+
+    fn meetings<'a>(&'a self, views: &'a [ViewRay]) -> Meetings<'a> {
+        Meetings { views, found: &self.found, points: &self.points }
     }
 }
