@@ -5,6 +5,7 @@
 
 pub mod eigen;
 pub mod float;
+pub mod lanes;
 pub mod origin;
 pub mod quadratic;
 pub mod random;

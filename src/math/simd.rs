@@ -31,7 +31,8 @@ pub trait Task {
     /// What comes of it.
     type Output;
 
-    /// Does it. To be inlined always, and so all that its loops call.
+    /// Does it. To be inlined always, and so all that its loops call. Loops over several arrays had better be in a function that has
+    /// these as arguments: of references in a struct compilers do not know that they are to different arrays.
     fn run(self) -> Self::Output;
 }
 

@@ -23,6 +23,9 @@ pub fn cross(a: DVec3, b: DVec3) -> DVec3 {
     DVec3::new(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
 }
 
+/// Squares of lengths of which the root loses nothing.
+pub const SAFE: std::ops::Range<f64> = 1e-200..1e200;
+
 /// Euclidean length, f64. Does not guard against overflow: components beyond 1e150 give infinity.
 #[inline(always)]
 pub fn length(a: DVec3) -> f64 {
@@ -38,7 +41,6 @@ pub fn normalize(a: DVec3) -> Option<DVec3> {
 /// The unit vector along `a` and its [`length`], which may have over- or underflowed; or `None` for zero, infinite and NaN vectors.
 #[inline(always)]
 pub fn normal_and_length(a: DVec3) -> Option<(DVec3, f64)> {
-    const SAFE: std::ops::Range<f64> = 1e-200..1e200;
     let squared = dot(a, a);
     let length = squared.sqrt();
     if SAFE.contains(&squared) {

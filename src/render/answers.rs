@@ -7,10 +7,10 @@ use glam::{DVec3, Vec3};
 
 use crate::geometry::{Hit, Key, Ray};
 use crate::math::float::{gamma, round_down};
+use crate::math::lanes::{LANES, Vectors32, whole_rows};
 use crate::math::simd::{Level, Task};
 use crate::math::vector::length;
 use crate::render::intersect::Intersect;
-use crate::render::lanes::{LANES, Vectors32, whole_rows};
 use crate::render::points::{Found, Points};
 use crate::render::shadow::{Illumination, Illuminations};
 use crate::render::surface::{SurfacePoint, moved_off};
@@ -217,14 +217,18 @@ impl Task for ShadowRays<'_> {
 impl ShadowRays<'_> {
     #[inline(always)]
     fn each(self, light: Option<DVec3>) {
-        let Self { lanes, points, illuminations, formed } = self;
-        for at in 0..lanes.min(LANES) {
-            let origin = moved_off(points.position.get(at), points.geometric_normal.get(at), points.offset[at]);
-            let ray = shadow_ray(origin, illuminations.to_light.get(at), light);
-            formed.origin.set(at, ray.origin);
-            formed.direction.set(at, ray.direction);
-            formed.t_max[at] = ray.t_max;
-        }
+        form(self.lanes, light, self.points, self.illuminations, self.formed);
+    }
+}
+
+#[inline(always)]
+fn form(lanes: usize, light: Option<DVec3>, points: &Points, illuminations: &Illuminations, formed: &mut Formed) {
+    for at in 0..lanes.min(LANES) {
+        let origin = moved_off(points.position.get(at), points.geometric_normal.get(at), points.offset[at]);
+        let ray = shadow_ray(origin, illuminations.to_light.get(at), light);
+        formed.origin.set(at, ray.origin);
+        formed.direction.set(at, ray.direction);
+        formed.t_max[at] = ray.t_max;
     }
 }
 

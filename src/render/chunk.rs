@@ -110,7 +110,6 @@ impl Task for Fill<'_, '_> {
     fn run(self) -> bool {
         let Self { chunk, rays } = self;
         let rays = &rays[..rays.len().min(CHUNK)];
-        let mut valid = [0u32; CHUNK];
         let lanes = rays.len().next_multiple_of(ROW);
         let mut direction = [[0.0f32; CHUNK]; 3];
         for (at, ray) in rays.iter().enumerate() {
@@ -118,19 +117,28 @@ impl Task for Fill<'_, '_> {
                 chunk.origin[axis][at] = ray.origin[axis];
                 direction[axis][at] = ray.direction[axis];
             }
-            chunk.t_min[at] = if ray.t_min > 0.0 { ray.t_min } else { 0.0 };
+            chunk.t_min[at] = ray.t_min;
             chunk.t_max[at] = ray.t_max;
-            valid[at] = u32::from(ray.is_valid());
         }
-        // All but these are valid most of the time.
-        let Some(first) = valid.iter().position(|&valid| valid != 0) else { return false };
-        for at in (0..lanes).filter(|&at| valid[at] == 0) {
-            for axis in 0..3 {
-                chunk.origin[axis][at] = chunk.origin[axis][first];
-                direction[axis][at] = direction[axis][first];
+        let mut valid = [0u32; CHUNK];
+        let mut most = 0;
+        for at in 0..rays.len() {
+            let (origin, direction) = (by_number(&chunk.origin, at), by_number(&direction, at));
+            let is_valid = is_valid(origin, direction, chunk.t_min[at], chunk.t_max[at]);
+            valid[at] = u32::from(is_valid);
+            most += valid[at];
+            chunk.t_min[at] = if chunk.t_min[at] > 0.0 { chunk.t_min[at] } else { 0.0 };
+        }
+        if (most as usize) < lanes {
+            let Some(first) = valid.iter().position(|&valid| valid != 0) else { return false };
+            for at in (0..lanes).filter(|&at| valid[at] == 0) {
+                for axis in 0..3 {
+                    chunk.origin[axis][at] = chunk.origin[axis][first];
+                    direction[axis][at] = direction[axis][first];
+                }
+                // Not even what has no ends meets this, and it is no end of the intervals.
+                (chunk.t_min[at], chunk.t_max[at]) = (f32::INFINITY, f32::NAN);
             }
-            // Not even what has no ends meets this, and it is no end of the intervals.
-            (chunk.t_min[at], chunk.t_max[at]) = (f32::INFINITY, f32::NAN);
         }
         for axis in 0..3 {
             for at in 0..lanes {
@@ -152,14 +160,31 @@ impl Task for Fill<'_, '_> {
     }
 }
 
+#[inline(always)]
+fn by_number(numbers: &[Numbers; 3], at: usize) -> [f32; 3] {
+    [numbers[0][at], numbers[1][at], numbers[2][at]]
+}
+
+/// [`Ray::is_valid`], without a branch.
+#[inline(always)]
+fn is_valid(origin: [f32; 3], direction: [f32; 3], t_min: f32, t_max: f32) -> bool {
+    let (mut finite, mut nonzero) = (true, false);
+    for axis in 0..3 {
+        finite &= (origin[axis].abs() <= f32::MAX) & (direction[axis].abs() <= f32::MAX);
+        nonzero |= direction[axis] != 0.0;
+    }
+    finite & nonzero & (t_min <= t_max) & (t_max >= 0.0)
+}
+
 /// The least of whole rows and the largest.
 #[inline(always)]
 fn ends(numbers: &[f32]) -> [f32; 2] {
     let (mut least, mut most) = ([f32::INFINITY; ROW], [f32::NEG_INFINITY; ROW]);
-    for row in numbers.chunks_exact(ROW) {
-        for (number, (least, most)) in row.iter().zip(least.iter_mut().zip(&mut most)) {
-            *least = if *number < *least { *number } else { *least };
-            *most = if *number > *most { *number } else { *most };
+    for row in numbers.as_chunks::<ROW>().0 {
+        for lane in 0..ROW {
+            let number = row[lane];
+            least[lane] = if number < least[lane] { number } else { least[lane] };
+            most[lane] = if number > most[lane] { number } else { most[lane] };
         }
     }
     let mut ends = [f32::INFINITY, f32::NEG_INFINITY];

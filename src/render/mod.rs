@@ -12,7 +12,6 @@ pub mod answers;
 mod chunk;
 pub mod film;
 pub mod intersect;
-mod lanes;
 mod points;
 pub mod ray_tracing;
 pub mod renderer;

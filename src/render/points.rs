@@ -4,10 +4,10 @@ use glam::{DVec3, Vec3};
 
 use crate::geometry::{Hit, TriangleMesh};
 use crate::math::Transform;
+use crate::math::lanes::{Flags, LANES, Numbers, Vectors, Vectors32, whole_rows};
 use crate::math::simd::{Level, Task};
-use crate::math::vector::dot;
-use crate::render::lanes::{Flags, LANES, Numbers, Vectors, Vectors32, whole_rows};
-use crate::render::surface::{Place, SAFE, SurfacePoint, interpolated, on_side_of, solve};
+use crate::math::vector::{SAFE, dot};
+use crate::render::surface::{Place, SurfacePoint, interpolated, on_side_of, solve};
 use crate::render::world::{Instance, World};
 use crate::scene::camera::ViewRay;
 use crate::scene::{Scene, Shape, compiled};
@@ -104,6 +104,8 @@ impl Points {
         let Shape::Mesh(mesh) = instance.shape else { return self.solve_each(scene, world, views, found) };
         let mesh = &*scene.meshes[mesh as usize];
         let mut given = Given::NONE;
+        // What is left to be found one by one.
+        let mut odd = [0; LANES];
         for (at, (hit, &ray)) in found.hits[..found.count].iter().zip(&found.rays).enumerate() {
             let view = &views[ray as usize];
             given.origin.set(at, view.origin);
@@ -119,16 +121,16 @@ impl Points {
         let transform = &instance.transform;
         let lanes = whole_rows(found.count);
         if instance.is_unmoved() {
-            level.run(OnTriangles::<false> { lanes, transform, given: &mut given, points: self });
+            level.run(OnTriangles::<false> { lanes, transform, given: &given, points: self, odd: &mut odd });
         } else {
-            level.run(OnTriangles::<true> { lanes, transform, given: &mut given, points: self });
+            level.run(OnTriangles::<true> { lanes, transform, given: &given, points: self, odd: &mut odd });
         }
         if compiled::NORMALS
             && let Some(normals) = &mesh.normals
         {
-            self.shade_smoothly(level, scene, instance, mesh, normals, found, &mut given);
+            self.shade_smoothly(level, scene, instance, mesh, normals, found, &mut given, &mut odd);
         }
-        self.solve_odd(scene, world, views, found, &given);
+        self.solve_odd(scene, world, views, found, &odd);
     }
 
     #[allow(clippy::too_many_arguments)]
@@ -141,6 +143,7 @@ impl Points {
         normals: &[Vec3],
         found: &Found,
         given: &mut Given,
+        odd: &mut Flags,
     ) {
         for (at, hit) in found.hits[..found.count].iter().enumerate() {
             let is_flat = scene.materials[self.materials[at] as usize].flat;
@@ -154,15 +157,15 @@ impl Points {
         let transform = &instance.transform;
         let lanes = whole_rows(found.count);
         if instance.is_unmoved() {
-            level.run(Smooth::<false> { lanes, transform, given, points: self });
+            level.run(Smooth::<false> { lanes, transform, given, points: self, odd });
         } else {
-            level.run(Smooth::<true> { lanes, transform, given, points: self });
+            level.run(Smooth::<true> { lanes, transform, given, points: self, odd });
         }
     }
 
     /// Those one by one that loops leave, since lengths are extreme.
-    fn solve_odd(&mut self, scene: &Scene, world: &World, views: &[ViewRay], found: &Found, given: &Given) {
-        for at in (0..found.count).filter(|&at| given.odd[at] != 0) {
+    fn solve_odd(&mut self, scene: &Scene, world: &World, views: &[ViewRay], found: &Found, odd: &Flags) {
+        for at in (0..found.count).filter(|&at| odd[at] != 0) {
             let view = &views[found.rays[at] as usize];
             self.set(at, &SurfacePoint::of(scene, world, view, &found.hits[at]));
         }
@@ -184,8 +187,6 @@ struct Given {
     corners: [Vectors32; 3],
     u: [f32; LANES],
     v: [f32; LANES],
-    /// What is left to be found one by one.
-    odd: Flags,
 }
 
 impl Given {
@@ -195,15 +196,15 @@ impl Given {
         corners: [Vectors32::ZERO; 3],
         u: [0.0; LANES],
         v: [0.0; LANES],
-        odd: [0; LANES],
     };
 }
 
 struct OnTriangles<'a, const MOVED: bool> {
     lanes: usize,
     transform: &'a Transform,
-    given: &'a mut Given,
+    given: &'a Given,
     points: &'a mut Points,
+    odd: &'a mut Flags,
 }
 
 impl<const MOVED: bool> Task for OnTriangles<'_, MOVED> {
@@ -211,28 +212,39 @@ impl<const MOVED: bool> Task for OnTriangles<'_, MOVED> {
 
     #[inline(always)]
     fn run(self) {
-        let Self { lanes, transform, given, points } = self;
-        for at in 0..lanes.min(LANES) {
-            let view = ViewRay { origin: given.origin.get(at), direction: given.direction.get(at) };
-            let corners = [given.corners[0].get(at), given.corners[1].get(at), given.corners[2].get(at)];
-            let (solved, is_regular) = solve::<MOVED>(transform, &view, [given.u[at], given.v[at]], corners);
-            let normal = solved.geometric_normal();
-            points.position.set(at, solved.position);
-            points.geometric_normal.set(at, normal);
-            points.normal.set(at, normal);
-            points.offset[at] = solved.offset;
-            points.from_outside[at] = u32::from(solved.from_outside);
-            points.place.set(at, DVec3::new(solved.weights[0], solved.weights[1], solved.weights[2]));
-            given.odd[at] = u32::from(!is_regular);
-        }
+        on_triangles::<MOVED>(self.lanes, self.transform, self.given, self.points, self.odd);
+    }
+}
+
+#[inline(always)]
+fn on_triangles<const MOVED: bool>(
+    lanes: usize,
+    transform: &Transform,
+    given: &Given,
+    points: &mut Points,
+    odd: &mut Flags,
+) {
+    for at in 0..lanes.min(LANES) {
+        let view = ViewRay { origin: given.origin.get(at), direction: given.direction.get(at) };
+        let corners = [given.corners[0].get(at), given.corners[1].get(at), given.corners[2].get(at)];
+        let (solved, is_regular) = solve::<MOVED>(transform, &view, [given.u[at], given.v[at]], corners);
+        let normal = solved.geometric_normal();
+        points.position.set(at, solved.position);
+        points.geometric_normal.set(at, normal);
+        points.normal.set(at, normal);
+        points.offset[at] = solved.offset;
+        points.from_outside[at] = u32::from(solved.from_outside);
+        points.place.set(at, DVec3::new(solved.weights[0], solved.weights[1], solved.weights[2]));
+        odd[at] = u32::from(!is_regular);
     }
 }
 
 struct Smooth<'a, const MOVED: bool> {
     lanes: usize,
     transform: &'a Transform,
-    given: &'a mut Given,
+    given: &'a Given,
     points: &'a mut Points,
+    odd: &'a mut Flags,
 }
 
 impl<const MOVED: bool> Task for Smooth<'_, MOVED> {
@@ -240,20 +252,24 @@ impl<const MOVED: bool> Task for Smooth<'_, MOVED> {
 
     #[inline(always)]
     fn run(self) {
-        let Self { lanes, transform, given, points } = self;
-        for at in 0..lanes.min(LANES) {
-            let corners = [given.corners[0].get(at), given.corners[1].get(at), given.corners[2].get(at)];
-            let place = points.place.get(at);
-            let (local, is_given) = interpolated(corners, [place.x, place.y, place.z]);
-            let world = if MOVED { transform.normal_to_world(local) } else { local };
-            let squared = dot(world, world);
-            let is_regular = (squared >= SAFE.start) & (squared < SAFE.end);
-            let face = points.geometric_normal.get(at);
-            let normal = on_side_of(world / squared.sqrt(), face);
-            let pick = |smooth: f64, flat: f64| if is_given { smooth } else { flat };
-            let normal = DVec3::new(pick(normal.x, face.x), pick(normal.y, face.y), pick(normal.z, face.z));
-            points.normal.set(at, normal);
-            given.odd[at] |= u32::from(is_given & !is_regular);
-        }
+        smooth::<MOVED>(self.lanes, self.transform, self.given, self.points, self.odd);
+    }
+}
+
+#[inline(always)]
+fn smooth<const MOVED: bool>(lanes: usize, transform: &Transform, given: &Given, points: &mut Points, odd: &mut Flags) {
+    for at in 0..lanes.min(LANES) {
+        let corners = [given.corners[0].get(at), given.corners[1].get(at), given.corners[2].get(at)];
+        let place = points.place.get(at);
+        let (local, is_given) = interpolated(corners, [place.x, place.y, place.z]);
+        let world = if MOVED { transform.normal_to_world(local) } else { local };
+        let squared = dot(world, world);
+        let is_regular = (squared >= SAFE.start) & (squared < SAFE.end);
+        let face = points.geometric_normal.get(at);
+        let normal = on_side_of(world / squared.sqrt(), face);
+        let pick = |smooth: f64, flat: f64| if is_given { smooth } else { flat };
+        let normal = DVec3::new(pick(normal.x, face.x), pick(normal.y, face.y), pick(normal.z, face.z));
+        points.normal.set(at, normal);
+        odd[at] |= u32::from(is_given & !is_regular);
     }
 }

@@ -218,16 +218,14 @@ fn pixels_together<I: Answers>(
         samples: tracer.scene.film.samples,
         finished,
     };
-    for &(x, y) in pixels {
-        let corner = DVec2::new(f64::from(x), f64::from(y));
-        for &position in positions.of(x, y) {
-            samples.push(camera.ray(corner + position));
-            if samples.count() == LARGEST {
-                samples.trace(tracer);
-            }
-        }
+    let (mut x, mut y) = (Vec::with_capacity(LARGEST), Vec::with_capacity(LARGEST));
+    for &pixel in pixels {
+        positions.add(pixel, &mut x, &mut y);
     }
-    samples.trace(tracer);
+    for (x, y) in x.chunks(LARGEST).zip(y.chunks(LARGEST)) {
+        camera.rays(x, y, |view| samples.push(view));
+        samples.trace(tracer);
+    }
 }
 
 /// Samples that are traced together, and the pixels that they belong to.

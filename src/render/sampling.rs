@@ -3,6 +3,8 @@
 use glam::DVec2;
 
 use crate::math::random::{hash2, unit};
+use crate::math::simd::{Level, Task};
+use crate::scene::film::MOST_SAMPLES;
 
 /// The position of a sample within its pixel, both coordinates in [0, 1).
 ///
@@ -57,36 +59,97 @@ impl Pattern {
     }
 }
 
+/// The most columns or rows of a grid of samples, as a power of two above: the grid has about as many of one as of the other.
+const MOST_LINES: usize = 1 << (u32::BITS - MOST_SAMPLES.leading_zeros()).div_ceil(2);
+
 /// The positions of all samples of one pixel after another, with what can be shared between them.
 #[derive(Debug)]
 pub struct Positions {
     samples: u32,
-    at: Vec<DVec2>,
-    columns: Vec<u32>,
-    rows: Vec<u32>,
+    /// The samples' numbers in the shuffled order.
+    shuffled: Vec<u32>,
+    columns: [u32; MOST_LINES],
+    rows: [u32; MOST_LINES],
 }
 
 impl Positions {
     /// For so many samples a pixel.
     pub fn new(samples: u32) -> Self {
-        Self { samples, at: vec![DVec2::splat(0.5); samples as usize], columns: Vec::new(), rows: Vec::new() }
+        assert!(samples <= MOST_SAMPLES, "no more than {MOST_SAMPLES} samples");
+        let lines = [0; MOST_LINES];
+        Self { samples, shuffled: vec![0; samples as usize], columns: lines, rows: lines }
     }
 
-    /// [`position`] for each of a pixel's samples.
-    pub fn of(&mut self, x: u32, y: u32) -> &[DVec2] {
-        if self.samples > 1 {
-            let pattern = Pattern::new(x, y, self.samples);
-            self.columns.clear();
-            self.columns.extend((0..pattern.columns).map(|column| pattern.column.at(column)));
-            self.rows.clear();
-            self.rows.extend((0..pattern.rows).map(|row| pattern.row.at(row)));
-            for (sample, at) in self.at.iter_mut().enumerate() {
-                let shuffled = pattern.order.at(sample as u32);
-                let (row, column) = (shuffled / pattern.columns, shuffled % pattern.columns);
-                *at = pattern.within(shuffled, self.columns[column as usize], self.rows[row as usize]);
-            }
+    /// Adds [`position`] of each of a pixel's samples to the pixel's corner, and the sums to two lists.
+    pub fn add(&mut self, pixel: (u32, u32), x: &mut Vec<f64>, y: &mut Vec<f64>) {
+        let (corner_x, corner_y) = (f64::from(pixel.0), f64::from(pixel.1));
+        if self.samples == 1 {
+            x.push(corner_x + 0.5);
+            y.push(corner_y + 0.5);
+            return;
         }
-        &self.at
+        let pattern = Pattern::new(pixel.0, pixel.1, self.samples);
+        let lines = |lines: &mut [u32; MOST_LINES], permutation: &Permutation| {
+            for (line, to) in (0..permutation.length).zip(lines) {
+                *to = permutation.at(line);
+            }
+        };
+        lines(&mut self.columns, &pattern.column);
+        lines(&mut self.rows, &pattern.row);
+        let (first, last) = (x.len(), x.len() + self.samples as usize);
+        x.resize(last, 0.0);
+        y.resize(last, 0.0);
+        let Self { shuffled, columns, rows, .. } = self;
+        let (x, y) = (&mut x[first..], &mut y[first..]);
+        Level::chosen().run(Spread { pattern: &pattern, corner: (corner_x, corner_y), shuffled, columns, rows, x, y });
+    }
+}
+
+struct Spread<'a> {
+    pattern: &'a Pattern,
+    corner: (f64, f64),
+    shuffled: &'a mut [u32],
+    columns: &'a [u32; MOST_LINES],
+    rows: &'a [u32; MOST_LINES],
+    x: &'a mut [f64],
+    y: &'a mut [f64],
+}
+
+impl Task for Spread<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { pattern, corner, shuffled, columns, rows, x, y } = self;
+        pattern.order.all(shuffled);
+        // Divisions of integers are no vectors.
+        if pattern.columns.is_power_of_two() {
+            spread::<true>(pattern, corner, shuffled, columns, rows, x, y);
+        } else {
+            spread::<false>(pattern, corner, shuffled, columns, rows, x, y);
+        }
+    }
+}
+
+#[inline(always)]
+fn spread<const POWER: bool>(
+    pattern: &Pattern,
+    corner: (f64, f64),
+    shuffled: &[u32],
+    columns: &[u32; MOST_LINES],
+    rows: &[u32; MOST_LINES],
+    x: &mut [f64],
+    y: &mut [f64],
+) {
+    let shift = pattern.columns.trailing_zeros();
+    for ((&shuffled, x), y) in shuffled.iter().zip(x).zip(y) {
+        let row = if POWER { shuffled >> shift } else { shuffled / pattern.columns };
+        let column = shuffled - row * pattern.columns;
+        // Without a check of bounds.
+        let line = |lines: &[u32; MOST_LINES], at: u32| lines[at as usize & (MOST_LINES - 1)];
+        let within = pattern.within(shuffled, line(columns, column), line(rows, row));
+        *x = corner.0 + within.x;
+        *y = corner.1 + within.y;
     }
 }
 
@@ -116,14 +179,36 @@ impl Permutation {
     fn at(&self, index: u32) -> u32 {
         let mut i = index;
         loop {
-            for (factor, term) in self.rounds {
-                i = i.wrapping_mul(factor).wrapping_add(term) & self.mask;
-                i ^= i >> self.shift;
-            }
+            i = self.step(i);
             if i < self.length {
                 return i;
             }
         }
+    }
+
+    /// All in order.
+    #[inline(always)]
+    fn all(&self, of: &mut [u32]) {
+        if self.length == self.mask + 1 {
+            for (index, to) in of.iter_mut().enumerate() {
+                *to = self.step(index as u32);
+            }
+        } else {
+            for (index, to) in of.iter_mut().enumerate() {
+                *to = self.at(index as u32);
+            }
+        }
+    }
+
+    /// The bijection on the next power of two.
+    #[inline(always)]
+    fn step(&self, index: u32) -> u32 {
+        let mut i = index;
+        for (factor, term) in self.rounds {
+            i = i.wrapping_mul(factor).wrapping_add(term) & self.mask;
+            i ^= i >> self.shift;
+        }
+        i
     }
 }
 
@@ -161,12 +246,17 @@ mod tests {
 
     #[test]
     fn all_samples_of_a_pixel_lie_where_each_does() {
-        for samples in [1, 2, 3, 16, 17, 100] {
+        for samples in [1, 2, 3, 16, 17, 100, 1000, MOST_SAMPLES] {
             let mut positions = Positions::new(samples);
-            for (x, y) in [(0, 0), (7, 11), (1023, 5)] {
-                let expected: Vec<_> = (0..samples).map(|sample| position(x, y, sample, samples)).collect();
-                assert_eq!(positions.of(x, y), expected);
-            }
+            let (mut x, mut y) = (Vec::new(), Vec::new());
+            let pixels = [(0, 0), (7, 11), (1023, 5)];
+            pixels.iter().for_each(|&pixel| positions.add(pixel, &mut x, &mut y));
+            let found: Vec<_> = x.into_iter().zip(y).map(|(x, y)| DVec2::new(x, y)).collect();
+            let expected = pixels.iter().flat_map(|&(x, y)| {
+                let corner = DVec2::new(f64::from(x), f64::from(y));
+                (0..samples).map(move |sample| corner + position(x, y, sample, samples))
+            });
+            assert_eq!(found, expected.collect::<Vec<_>>(), "{samples}");
         }
     }
 

@@ -3,12 +3,12 @@
 use glam::DVec3;
 
 use crate::error::{Error, Result};
+use crate::math::lanes::{Flags, LANES, Numbers, Vectors, Vectors32, whole_rows};
 use crate::math::simd::{Level, Task};
-use crate::math::vector::{dot, normalize};
+use crate::math::vector::{SAFE, dot, normalize};
 use crate::render::answers::{Answers, Meeting};
-use crate::render::lanes::{Flags, LANES, Numbers, Vectors, Vectors32, whole_rows};
 use crate::render::points::Points;
-use crate::render::surface::{SAFE, SurfacePoint};
+use crate::render::surface::SurfacePoint;
 use crate::render::trace::Tracer;
 use crate::scene::{Falloff, Light, LightKind, Rgb};
 
@@ -219,19 +219,23 @@ impl Task for Illuminate<'_> {
 impl Illuminate<'_> {
     #[inline(always)]
     fn each(self, light: PreparedLight) {
-        let Self { lanes, points, found, odd, .. } = self;
-        for at in 0..lanes.min(LANES) {
-            let (offset, is_apart) = light.offset(points.position.get(at));
-            let squared = dot(offset, offset);
-            let is_regular = light.is_distant | (squared >= SAFE.start) & (squared < SAFE.end);
-            let to_light = if light.is_distant { offset } else { offset / squared.sqrt() };
-            let (n_dot_l, color, is_lit) = light.shine(to_light, squared, points.normal.get(at));
-            found.to_light.set(at, to_light);
-            found.n_dot_l[at] = n_dot_l;
-            found.color.set(at, color);
-            found.is_lit[at] = u32::from(is_apart & is_lit);
-            odd[at] = u32::from(is_apart & !is_regular);
-        }
+        illuminate(self.lanes, &light, self.points, self.found, self.odd);
+    }
+}
+
+#[inline(always)]
+fn illuminate(lanes: usize, light: &PreparedLight, points: &Points, found: &mut Illuminations, odd: &mut Flags) {
+    for at in 0..lanes.min(LANES) {
+        let (offset, is_apart) = light.offset(points.position.get(at));
+        let squared = dot(offset, offset);
+        let is_regular = light.is_distant | (squared >= SAFE.start) & (squared < SAFE.end);
+        let to_light = if light.is_distant { offset } else { offset / squared.sqrt() };
+        let (n_dot_l, color, is_lit) = light.shine(to_light, squared, points.normal.get(at));
+        found.to_light.set(at, to_light);
+        found.n_dot_l[at] = n_dot_l;
+        found.color.set(at, color);
+        found.is_lit[at] = u32::from(is_apart & is_lit);
+        odd[at] = u32::from(is_apart & !is_regular);
     }
 }
 

@@ -6,7 +6,7 @@ use crate::geometry::triangle::hit_bounds_by_number;
 use crate::geometry::{Bounds, Hit, Quadric};
 use crate::math::Transform;
 use crate::math::float::{gamma, round_down, round_up};
-use crate::math::vector::{cross, dot, normal_and_length, normalize};
+use crate::math::vector::{SAFE, cross, dot, normal_and_length, normalize};
 use crate::render::world::{Instance, World};
 use crate::scene::camera::ViewRay;
 use crate::scene::{Scene, Shape, compiled};
@@ -237,9 +237,6 @@ impl Solved {
         }
     }
 }
-
-/// The squares of lengths that can be taken the root of without losing anything.
-pub(super) const SAFE: std::ops::Range<f64> = 1e-200..1e200;
 
 /// Solves for the point where a ray meets a triangle, of an object that is `MOVED` or stands in the world as it is; `uv` are the hit's.
 ///

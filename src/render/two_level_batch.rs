@@ -40,18 +40,18 @@ impl<T> Group<T> {
         self.places.clear();
     }
 
-    /// Adds a ray of the chunk, brought into the instance's space; not where rounding left it without a direction.
-    #[inline(always)]
-    fn push(&mut self, instance: &Instance, ray: &Ray, clip: Interval, place: u16, answer: T) {
-        let mut own = *ray;
-        if !instance.is_unmoved() {
-            let (origin, direction) = instance.local_line(ray.origin.as_dvec3(), ray.direction.as_dvec3());
-            (own.origin, own.direction) = (origin.as_vec3(), direction.as_vec3());
-            self.clips.push(clip);
+    /// Takes the rays at its places of the chunk, brought into the instance's space.
+    fn take(&mut self, instance: &Instance, rays: &[Ray]) {
+        let ray = |&place: &u16| rays[usize::from(place)];
+        if instance.is_unmoved() {
+            self.clips.clear();
+            self.rays.extend(self.places.iter().map(ray));
+        } else {
+            self.rays.extend(self.places.iter().map(ray).map(|ray| {
+                let (origin, direction) = instance.local_line(ray.origin.as_dvec3(), ray.direction.as_dvec3());
+                Ray { origin: origin.as_vec3(), direction: direction.as_vec3(), ..ray }
+            }));
         }
-        self.rays.push(own);
-        self.answers.push(answer);
-        self.places.push(place);
     }
 }
 
@@ -157,9 +157,12 @@ impl<A: TriangleAccelerator> TwoLevel<A> {
         group.clear();
         for (place, clip) in chunk.meeting(instance.bounds.as_ref()) {
             if let Some(answer) = answer(place, clip.near) {
-                group.push(instance, &rays[place], clip, place as u16, answer);
+                group.places.push(place as u16);
+                group.clips.push(clip);
+                group.answers.push(answer);
             }
         }
+        group.take(instance, rays);
     }
 
     /// The wanted instances that rays of the chunk may meet, in the order in which they may be entered first; `None` if they are

@@ -6,9 +6,9 @@
 //! comes where it does in the recursion.
 
 use crate::geometry::Hit;
+use crate::math::lanes::{LANES, Vectors32, whole_rows};
 use crate::math::simd::{Level, Task};
 use crate::render::answers::{Answers, Meetings};
-use crate::render::lanes::{LANES, Vectors32, whole_rows};
 use crate::render::points::{Found, Points};
 use crate::render::settings::ThreadSeconds;
 use crate::render::shade::diffused;
@@ -255,14 +255,18 @@ impl Task for AddDiffuse<'_> {
 
     #[inline(always)]
     fn run(self) {
-        let Self { lanes, illuminations, diffuse, color } = self;
-        for at in 0..lanes.min(LANES) {
-            let before = color.get(at);
-            let after = before + illuminations.color.get(at) * diffused(diffuse.get(at), illuminations.n_dot_l[at]);
-            let is_lit = illuminations.is_lit[at] != 0;
-            let pick = |after: f32, before: f32| if is_lit { after } else { before };
-            color.set(at, Rgb::new(pick(after.x, before.x), pick(after.y, before.y), pick(after.z, before.z)));
-        }
+        add_diffuse(self.lanes, self.illuminations, self.diffuse, self.color);
+    }
+}
+
+#[inline(always)]
+fn add_diffuse(lanes: usize, illuminations: &Illuminations, diffuse: &Vectors32, color: &mut Vectors32) {
+    for at in 0..lanes.min(LANES) {
+        let before = color.get(at);
+        let after = before + illuminations.color.get(at) * diffused(diffuse.get(at), illuminations.n_dot_l[at]);
+        let is_lit = illuminations.is_lit[at] != 0;
+        let pick = |after: f32, before: f32| if is_lit { after } else { before };
+        color.set(at, Rgb::new(pick(after.x, before.x), pick(after.y, before.y), pick(after.z, before.z)));
     }
 }
 
@@ -278,22 +282,28 @@ impl Blocks {
     /// Adds a hit to the block of its instance, or to the mixed one where many have blocks.
     #[inline(always)]
     fn push(&mut self, instance: u32, ray: u32, hit: Hit) {
+        let block = match self.open.last() {
+            // Most rays follow one that hit the same.
+            Some(&(key, block)) if key == instance && !self.all[block].found.is_full() => block,
+            _ => self.block_for(instance),
+        };
+        self.all[block].found.push(ray, hit);
+    }
+
+    /// A block with room, the last of the open ones afterwards.
+    fn block_for(&mut self, instance: u32) -> usize {
         let find = |open: &[(u32, usize)], key: u32| open.iter().position(|(of, _)| *of == key);
-        let (key, mut open) = match find(&self.open, instance) {
+        let (key, open) = match find(&self.open, instance) {
             None if self.open.len() >= MOST_OPEN => (MIXED, find(&self.open, MIXED)),
             found => (instance, found),
         };
-        let has_room = |at: &usize| !self.all[self.open[*at].1].found.is_full();
-        let block = match open.take_if(|at| has_room(at)) {
-            Some(at) => self.open[at].1,
-            None => {
-                self.open.retain(|(of, _)| *of != key);
-                self.open.push((key, self.all.len()));
-                self.all.push(Block::new(key));
-                self.all.len() - 1
-            }
-        };
-        self.all[block].found.push(ray, hit);
+        let block = open.map(|at| self.open.remove(at).1).filter(|&block| !self.all[block].found.is_full());
+        let block = block.unwrap_or_else(|| {
+            self.all.push(Block::new(key));
+            self.all.len() - 1
+        });
+        self.open.push((key, block));
+        block
     }
 }
 

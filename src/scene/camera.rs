@@ -3,7 +3,9 @@
 use glam::{DVec2, DVec3};
 
 use crate::error::{Error, Result};
-use crate::math::vector::{cross, normalize};
+use crate::math::lanes::{Flags, LANES, Vectors};
+use crate::math::simd::{Level, Task};
+use crate::math::vector::{SAFE, cross, dot, normalize};
 
 /// A camera with its name in the file.
 #[derive(Debug, Clone, PartialEq)]
@@ -147,22 +149,86 @@ impl CameraRays {
     /// `None` where the four-point camera's rectangle passes through its viewpoint.
     #[inline]
     pub fn ray(&self, point: DVec2) -> Option<ViewRay> {
-        let x = 2.0 * point.x / self.width - 1.0;
-        let y = 1.0 - 2.0 * point.y / self.height;
+        let (origin, direction) = self.line(point.x, point.y);
+        if matches!(self.kind, RayKind::Parallel { .. }) {
+            return Some(ViewRay { origin, direction });
+        }
+        normalize(direction).map(|direction| ViewRay { origin, direction })
+    }
+
+    /// Where the ray through a point starts, and its direction, of unit length for parallel rays and else of any.
+    #[inline(always)]
+    fn line(&self, x: f64, y: f64) -> (DVec3, DVec3) {
+        let across = 2.0 * x / self.width - 1.0;
+        let upward = 1.0 - 2.0 * y / self.height;
         match self.kind {
-            RayKind::Perspective { eye, forward, right, up } => {
-                let direction = normalize(forward + right * x + up * y)?;
-                Some(ViewRay { origin: eye, direction })
-            }
-            RayKind::Parallel { eye, forward, right, up } => {
-                Some(ViewRay { origin: eye + right * x + up * y, direction: forward })
-            }
+            RayKind::Perspective { eye, forward, right, up } => (eye, forward + right * across + up * upward),
+            RayKind::Parallel { eye, forward, right, up } => (eye + right * across + up * upward, forward),
             RayKind::FourPoint { viewpoint, corner, step_i, step_j } => {
-                let (i, j) = (point.x - 0.5, self.height - 0.5 - point.y);
-                let direction = normalize(corner + step_i * i + step_j * j - viewpoint)?;
-                Some(ViewRay { origin: viewpoint, direction })
+                let (i, j) = (x - 0.5, self.height - 0.5 - y);
+                (viewpoint, corner + step_i * i + step_j * j - viewpoint)
             }
         }
+    }
+
+    /// [`ray`](Self::ray) for each of some points, given by their coordinates; `each` is called in order.
+    pub fn rays(&self, x: &[f64], y: &[f64], mut each: impl FnMut(Option<ViewRay>)) {
+        let mut formed = Formed { origin: Vectors::ZERO, direction: Vectors::ZERO, is_odd: [0; LANES] };
+        for (x, y) in x.chunks(LANES).zip(y.chunks(LANES)) {
+            Level::chosen().run(Form { camera: self, x, y, formed: &mut formed });
+            for (at, (&x, &y)) in x.iter().zip(y).enumerate() {
+                if formed.is_odd[at] == 0 {
+                    each(Some(ViewRay { origin: formed.origin.get(at), direction: formed.direction.get(at) }));
+                } else {
+                    each(self.ray(DVec2::new(x, y)));
+                }
+            }
+        }
+    }
+}
+
+/// Rays number by number.
+struct Formed {
+    origin: Vectors,
+    direction: Vectors,
+    /// Where the direction's length is extreme.
+    is_odd: Flags,
+}
+
+struct Form<'a> {
+    camera: &'a CameraRays,
+    x: &'a [f64],
+    y: &'a [f64],
+    formed: &'a mut Formed,
+}
+
+impl Task for Form<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { camera, x, y, formed } = self;
+        let (width, height) = (camera.width, camera.height);
+        // Known to the compiler in each of these, so that the loops have no branches.
+        match camera.kind {
+            kind @ RayKind::Perspective { .. } => form(&CameraRays { kind, width, height }, x, y, formed),
+            kind @ RayKind::Parallel { .. } => form(&CameraRays { kind, width, height }, x, y, formed),
+            kind @ RayKind::FourPoint { .. } => form(&CameraRays { kind, width, height }, x, y, formed),
+        }
+    }
+}
+
+#[inline(always)]
+fn form(camera: &CameraRays, x: &[f64], y: &[f64], formed: &mut Formed) {
+    let is_unit = matches!(camera.kind, RayKind::Parallel { .. });
+    let count = x.len().min(y.len()).min(LANES);
+    for at in 0..count {
+        let (origin, direction) = camera.line(x[at], y[at]);
+        let squared = dot(direction, direction);
+        let is_regular = is_unit | (squared >= SAFE.start) & (squared < SAFE.end);
+        formed.origin.set(at, origin);
+        formed.direction.set(at, if is_unit { direction } else { direction / squared.sqrt() });
+        formed.is_odd[at] = u32::from(!is_regular);
     }
 }
 

@@ -2,8 +2,6 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::scene::Rgb;
-
 /// Things that are computed together.
 pub const LANES: usize = 64;
 
@@ -69,7 +67,7 @@ impl Vectors32 {
 
     /// Sets one.
     #[inline(always)]
-    pub fn set(&mut self, at: usize, v: Rgb) {
+    pub fn set(&mut self, at: usize, v: Vec3) {
         self.x[at] = v.x;
         self.y[at] = v.y;
         self.z[at] = v.z;
