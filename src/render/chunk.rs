@@ -1,7 +1,10 @@
 //! Some rays as their crossings with boxes need them: number by number, in loops that become vectors.
 
+use glam::Vec3;
+
 use crate::geometry::ray::{Interval, padded};
 use crate::geometry::{Bounds, Ray};
+use crate::math::Transform;
 use crate::math::simd::{Level, Task};
 
 /// Rays that are asked together: what is prepared of them should stay in the nearest cache.
@@ -20,6 +23,7 @@ pub struct Chunk {
     /// Of whole rows, so many are used.
     lanes: usize,
     origin: [Numbers; 3],
+    direction: [Numbers; 3],
     inverse: [Numbers; 3],
     inverse_far: [Numbers; 3],
     /// Intervals of t as [`PreparedRay`](crate::geometry::PreparedRay) has them.
@@ -34,6 +38,8 @@ pub struct Chunk {
     far: Numbers,
     /// Whether they meet what is in it, as 1 or 0.
     meets: [u32; CHUNK],
+    /// Origins and directions in the object's space that was asked for last.
+    moved: [[Numbers; 3]; 2],
 }
 
 /// The ends of the origins and inverses along an axis.
@@ -53,6 +59,7 @@ impl Chunk {
             level,
             lanes: 0,
             origin: [nothing; 3],
+            direction: [nothing; 3],
             inverse: [nothing; 3],
             inverse_far: [nothing; 3],
             t_min: nothing,
@@ -62,6 +69,7 @@ impl Chunk {
             near: nothing,
             far: nothing,
             meets: [0; CHUNK],
+            moved: [[nothing; 3]; 2],
         })
     }
 
@@ -96,6 +104,13 @@ impl Chunk {
         let meets = self.meets[..self.lanes].iter().enumerate().filter(|(_, meets)| **meets != 0);
         meets.map(|(at, _)| (at, Interval { near: self.near[at], far: self.far[at] }))
     }
+
+    /// Brings all rays into an object's space, and gives origin and direction of the one at a position; each is rounded once.
+    pub fn local<'a>(&'a mut self, transform: &Transform) -> impl Fn(usize) -> (Vec3, Vec3) + use<'a> {
+        self.level.run(Move { chunk: self, transform });
+        let moved = &self.moved;
+        move |at| (Vec3::from_array(by_number(&moved[0], at)), Vec3::from_array(by_number(&moved[1], at)))
+    }
 }
 
 struct Fill<'a, 'b> {
@@ -111,11 +126,10 @@ impl Task for Fill<'_, '_> {
         let Self { chunk, rays } = self;
         let rays = &rays[..rays.len().min(CHUNK)];
         let lanes = rays.len().next_multiple_of(ROW);
-        let mut direction = [[0.0f32; CHUNK]; 3];
         for (at, ray) in rays.iter().enumerate() {
             for axis in 0..3 {
                 chunk.origin[axis][at] = ray.origin[axis];
-                direction[axis][at] = ray.direction[axis];
+                chunk.direction[axis][at] = ray.direction[axis];
             }
             chunk.t_min[at] = ray.t_min;
             chunk.t_max[at] = ray.t_max;
@@ -123,7 +137,7 @@ impl Task for Fill<'_, '_> {
         let mut valid = [0u32; CHUNK];
         let mut most = 0;
         for at in 0..rays.len() {
-            let (origin, direction) = (by_number(&chunk.origin, at), by_number(&direction, at));
+            let (origin, direction) = (by_number(&chunk.origin, at), by_number(&chunk.direction, at));
             let is_valid = is_valid(origin, direction, chunk.t_min[at], chunk.t_max[at]);
             valid[at] = u32::from(is_valid);
             most += valid[at];
@@ -134,7 +148,7 @@ impl Task for Fill<'_, '_> {
             for at in (0..lanes).filter(|&at| valid[at] == 0) {
                 for axis in 0..3 {
                     chunk.origin[axis][at] = chunk.origin[axis][first];
-                    direction[axis][at] = direction[axis][first];
+                    chunk.direction[axis][at] = chunk.direction[axis][first];
                 }
                 // Not even what has no ends meets this, and it is no end of the intervals.
                 (chunk.t_min[at], chunk.t_max[at]) = (f32::INFINITY, f32::NAN);
@@ -142,7 +156,7 @@ impl Task for Fill<'_, '_> {
         }
         for axis in 0..3 {
             for at in 0..lanes {
-                let inverse = 1.0 / direction[axis][at];
+                let inverse = 1.0 / chunk.direction[axis][at];
                 chunk.inverse[axis][at] = inverse;
                 chunk.inverse_far[axis][at] = padded(inverse);
             }
@@ -194,6 +208,38 @@ fn ends(numbers: &[f32]) -> [f32; 2] {
     ends
 }
 
+struct Move<'a> {
+    chunk: &'a mut Chunk,
+    transform: &'a Transform,
+}
+
+impl Task for Move<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Chunk { lanes, origin, direction, moved, .. } = self.chunk;
+        bring(*lanes, self.transform, origin, direction, moved);
+    }
+}
+
+#[inline(always)]
+fn bring(
+    lanes: usize,
+    transform: &Transform,
+    origin: &[Numbers; 3],
+    direction: &[Numbers; 3],
+    moved: &mut [[Numbers; 3]; 2],
+) {
+    for at in 0..lanes.min(CHUNK) {
+        let of = |numbers: [f32; 3]| Vec3::from_array(numbers).as_dvec3();
+        let start = transform.point_to_object(of(by_number(origin, at))).as_vec3();
+        let way = transform.vector_to_object(of(by_number(direction, at))).as_vec3();
+        (moved[0][0][at], moved[0][1][at], moved[0][2][at]) = (start.x, start.y, start.z);
+        (moved[1][0][at], moved[1][1][at], moved[1][2][at]) = (way.x, way.y, way.z);
+    }
+}
+
 struct Cross<'a> {
     chunk: &'a mut Chunk,
     bounds: Option<&'a Bounds>,
@@ -231,7 +277,7 @@ mod tests {
     use super::*;
     use crate::geometry::PreparedRay;
     use crate::math::random::Random;
-    use glam::{DVec3, Vec3};
+    use glam::DVec3;
 
     /// Rays from about one place to about another; of some chunks one runs along an axis, or meets nothing.
     fn rays(random: &mut Random, chunk: usize) -> Vec<Ray> {

@@ -41,15 +41,22 @@ impl<T> Group<T> {
     }
 
     /// Takes the rays at its places of the chunk, brought into the instance's space.
-    fn take(&mut self, instance: &Instance, rays: &[Ray]) {
-        let ray = |&place: &u16| rays[usize::from(place)];
+    fn take(&mut self, instance: &Instance, chunk: &mut Chunk, rays: &[Ray]) {
         if instance.is_unmoved() {
             self.clips.clear();
-            self.rays.extend(self.places.iter().map(ray));
-        } else {
-            self.rays.extend(self.places.iter().map(ray).map(|ray| {
+            self.rays.extend(self.places.iter().map(|&place| rays[usize::from(place)]));
+        } else if self.places.len() < rays.len() / 8 {
+            // The loop over all would take longer.
+            self.rays.extend(self.places.iter().map(|&place| {
+                let ray = rays[usize::from(place)];
                 let (origin, direction) = instance.local_line(ray.origin.as_dvec3(), ray.direction.as_dvec3());
                 Ray { origin: origin.as_vec3(), direction: direction.as_vec3(), ..ray }
+            }));
+        } else {
+            let local = chunk.local(&instance.transform);
+            self.rays.extend(self.places.iter().map(|&place| {
+                let (origin, direction) = local(usize::from(place));
+                Ray { origin, direction, ..rays[usize::from(place)] }
             }));
         }
     }
@@ -162,7 +169,7 @@ impl<A: TriangleAccelerator> TwoLevel<A> {
                 group.answers.push(answer);
             }
         }
-        group.take(instance, rays);
+        group.take(instance, chunk, rays);
     }
 
     /// The wanted instances that rays of the chunk may meet, in the order in which they may be entered first; `None` if they are

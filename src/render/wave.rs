@@ -38,6 +38,8 @@ struct Block {
     color: Vectors32,
     /// Whether a material has a highlight.
     is_glossy: bool,
+    /// Whether a material reflects or lets light through.
+    goes_on: bool,
 }
 
 const MIXED: u32 = u32::MAX;
@@ -108,11 +110,17 @@ impl<I: Answers> Tracer<'_, I> {
         let deeper = depth < self.scene.film.max_depth;
         for block in &blocks {
             let meetings = block.meetings(&traced.views);
+            if !(deeper && block.goes_on) {
+                for (at, &ray) in block.found.rays[..block.found.count].iter().enumerate() {
+                    colors[ray as usize] = self.clamp(block.color.get(at));
+                }
+                continue;
+            }
             for at in 0..block.found.count {
                 let (ray, color, number) = (block.found.rays[at], block.color.get(at), block.points.materials[at]);
                 let material = &self.scene.materials[number as usize];
-                let reflects = deeper && compiled::REFLECTION && material.is_reflective();
-                let transmits = deeper && !self.is_opaque() && material.is_transmissive();
+                let reflects = compiled::REFLECTION && material.is_reflective();
+                let transmits = !self.is_opaque() && material.is_transmissive();
                 if !reflects && !transmits {
                     colors[ray as usize] = self.clamp(color);
                     continue;
@@ -166,13 +174,24 @@ impl<I: Answers> Tracer<'_, I> {
 
     /// Looks up the colours of a block's points.
     fn color_all(&self, block: &mut Block) {
+        // Neighbours have the same material most of the time, and without an image the same colours.
+        let mut last = None;
         for at in 0..block.found.count {
-            let material = &self.scene.materials[block.points.materials[at] as usize];
-            let point = || block.points.get(at);
-            let colors = self.material_colors(material, || (point(), block.found.hits[at]));
+            let number = block.points.materials[at];
+            let colors = match last {
+                Some((same, colors)) if same == number => colors,
+                _ => {
+                    let material = &self.scene.materials[number as usize];
+                    block.is_glossy |= material.ks != Rgb::ZERO;
+                    block.goes_on |= material.is_reflective() || material.is_transmissive();
+                    let point = || (block.points.get(at), block.found.hits[at]);
+                    let colors = self.material_colors(material, point);
+                    last = material.diffuse_texture.is_none().then_some((number, colors));
+                    colors
+                }
+            };
             block.color.set(at, colors.ambient);
             block.diffuse.set(at, colors.diffuse);
-            block.is_glossy |= material.ks != Rgb::ZERO;
         }
     }
 
@@ -323,7 +342,7 @@ impl<R> Rays<R> {
 impl Block {
     fn new(instance: u32) -> Self {
         let (diffuse, color) = (Vectors32::ZERO, Vectors32::ZERO);
-        Self { found: Found::NONE, instance, points: Points::NONE, diffuse, color, is_glossy: false }
+        Self { found: Found::NONE, instance, points: Points::NONE, diffuse, color, is_glossy: false, goes_on: false }
     }
 
     fn meetings<'a>(&'a self, views: &'a [ViewRay]) -> Meetings<'a> {
