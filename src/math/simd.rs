@@ -32,7 +32,8 @@ pub trait Task {
     type Output;
 
     /// Does it. To be inlined always, and so all that its loops call. Loops over several arrays had better be in a function that has
-    /// these as arguments: of references in a struct compilers do not know that they are to different arrays.
+    /// these as arguments, those that are written apart from those that are read: of references in a struct, and of arrays in one that is
+    /// written, compilers do not know what overlaps.
     fn run(self) -> Self::Output;
 }
 

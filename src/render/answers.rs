@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 
 use crate::geometry::{Hit, Key, Ray};
 use crate::math::float::{gamma, round_down};
-use crate::math::lanes::{LANES, Vectors32, whole_rows};
+use crate::math::lanes::{Flags, LANES, Vectors, Vectors32, whole_rows};
 use crate::math::simd::{Level, Task};
 use crate::math::vector::length;
 use crate::render::intersect::Intersect;
@@ -64,6 +64,13 @@ pub trait Answers: Sync {
 
     /// The ray from a point to a light, which ends just before the light.
     fn shadow_ray(&self, from: &Meeting<'_>, illumination: &Illumination) -> Self::Ray;
+
+    /// [`ray_outside`](Self::ray_outside) in these directions, from those points that are `chosen`, in their order.
+    fn rays_outside(&self, from: &Meetings<'_>, directions: &Vectors, chosen: &Flags, rays: &mut Vec<Self::Ray>) {
+        for at in (0..from.found.count).filter(|&at| chosen[at] != 0) {
+            rays.push(from.with(at, |here| self.ray_outside(here, directions.get(at))));
+        }
+    }
 
     /// [`shadow_ray`](Self::shadow_ray) for each point that a light shines at, in their order.
     fn shadow_rays(&self, from: &Meetings<'_>, illuminations: &Illuminations, rays: &mut Vec<Self::Ray>) {
@@ -130,17 +137,18 @@ impl<I: Intersect> Answers for I {
         shadow_ray(from.point.origin_outside(), illumination.to_light, illumination.position)
     }
 
+    fn rays_outside(&self, from: &Meetings<'_>, directions: &Vectors, chosen: &Flags, rays: &mut Vec<Ray>) {
+        let mut formed = Formed::NONE;
+        let (lanes, points) = (whole_rows(from.found.count), from.points);
+        Level::chosen().run(Spawned { lanes, points, directions, formed: &mut formed });
+        formed.add(from.found.count, chosen, rays);
+    }
+
     fn shadow_rays(&self, from: &Meetings<'_>, illuminations: &Illuminations, rays: &mut Vec<Ray>) {
-        let count = from.found.count;
-        let mut formed = Formed { origin: Vectors32::ZERO, direction: Vectors32::ZERO, t_max: [0.0; LANES] };
-        let (lanes, points) = (whole_rows(count), from.points);
+        let mut formed = Formed::NONE;
+        let (lanes, points) = (whole_rows(from.found.count), from.points);
         Level::chosen().run(ShadowRays { lanes, points, illuminations, formed: &mut formed });
-        rays.extend((0..count).filter(|&at| illuminations.is_lit[at] != 0).map(|at| Ray {
-            origin: formed.origin.get(at),
-            t_min: SPAWNED_T_MIN,
-            direction: formed.direction.get(at),
-            t_max: formed.t_max[at],
-        }));
+        formed.add(from.found.count, &illuminations.is_lit, rays);
     }
 
     #[inline(always)]
@@ -194,6 +202,51 @@ struct Formed {
     t_max: [f32; LANES],
 }
 
+impl Formed {
+    const NONE: Self = Self { origin: Vectors32::ZERO, direction: Vectors32::ZERO, t_max: [0.0; LANES] };
+
+    /// Adds those that are chosen.
+    fn add(&self, count: usize, chosen: &Flags, rays: &mut Vec<Ray>) {
+        rays.extend((0..count).filter(|&at| chosen[at] != 0).map(|at| Ray {
+            origin: self.origin.get(at),
+            t_min: SPAWNED_T_MIN,
+            direction: self.direction.get(at),
+            t_max: self.t_max[at],
+        }));
+    }
+
+    #[inline(always)]
+    fn set(&mut self, at: usize, ray: Ray) {
+        self.origin.set(at, ray.origin);
+        self.direction.set(at, ray.direction);
+        self.t_max[at] = ray.t_max;
+    }
+}
+
+struct Spawned<'a> {
+    lanes: usize,
+    points: &'a Points,
+    directions: &'a Vectors,
+    formed: &'a mut Formed,
+}
+
+impl Task for Spawned<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        spawn(self.lanes, self.points, self.directions, self.formed);
+    }
+}
+
+#[inline(always)]
+fn spawn(lanes: usize, points: &Points, directions: &Vectors, formed: &mut Formed) {
+    for at in 0..lanes.min(LANES) {
+        let origin = moved_off(points.position.get(at), points.geometric_normal.get(at), points.offset[at]);
+        formed.set(at, spawned(origin, directions.get(at)));
+    }
+}
+
 struct ShadowRays<'a> {
     lanes: usize,
     points: &'a Points,
@@ -225,10 +278,7 @@ impl ShadowRays<'_> {
 fn form(lanes: usize, light: Option<DVec3>, points: &Points, illuminations: &Illuminations, formed: &mut Formed) {
     for at in 0..lanes.min(LANES) {
         let origin = moved_off(points.position.get(at), points.geometric_normal.get(at), points.offset[at]);
-        let ray = shadow_ray(origin, illuminations.to_light.get(at), light);
-        formed.origin.set(at, ray.origin);
-        formed.direction.set(at, ray.direction);
-        formed.t_max[at] = ray.t_max;
+        formed.set(at, shadow_ray(origin, illuminations.to_light.get(at), light));
     }
 }
 

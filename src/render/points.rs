@@ -24,6 +24,8 @@ pub struct Found {
 
 /// Their points, as [`SurfacePoint`] has them.
 pub struct Points {
+    /// Unit directions of the rays that came.
+    pub(super) direction: Vectors,
     pub(super) position: Vectors,
     pub(super) geometric_normal: Vectors,
     pub(super) normal: Vectors,
@@ -56,6 +58,7 @@ impl Found {
 impl Points {
     /// Without meaning.
     pub const NONE: Self = Self {
+        direction: Vectors::ZERO,
         position: Vectors::ZERO,
         geometric_normal: Vectors::ZERO,
         normal: Vectors::ZERO,
@@ -118,6 +121,7 @@ impl Points {
             self.materials[at] = scene.material_of(hit.instance, hit.primitive);
             self.on_triangle[at] = true;
         }
+        self.direction = given.direction;
         let transform = &instance.transform;
         let lanes = whole_rows(found.count);
         if instance.is_unmoved() {
@@ -174,7 +178,9 @@ impl Points {
     /// Finds the points of hits on whatever instances.
     pub fn solve_each(&mut self, scene: &Scene, world: &World, views: &[ViewRay], found: &Found) {
         for (at, (hit, &ray)) in found.hits[..found.count].iter().zip(&found.rays).enumerate() {
-            self.set(at, &SurfacePoint::of(scene, world, &views[ray as usize], hit));
+            let view = &views[ray as usize];
+            self.direction.set(at, view.direction);
+            self.set(at, &SurfacePoint::of(scene, world, view, hit));
         }
     }
 }

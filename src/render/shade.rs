@@ -4,8 +4,11 @@
 use glam::DVec3;
 
 use crate::geometry::Hit;
-use crate::math::vector::{dot, normalize};
+use crate::math::lanes::{Flags, LANES, Vectors, whole_rows};
+use crate::math::simd::{Level, Task};
+use crate::math::vector::{SAFE, dot, normalize};
 use crate::render::answers::{Answers, Meeting};
+use crate::render::points::Points;
 use crate::render::shadow::{Illumination, PreparedLight};
 use crate::render::surface::SurfacePoint;
 use crate::render::trace::{TracedRay, Tracer};
@@ -162,16 +165,26 @@ impl<I: Answers> Tracer<'_, I> {
 /// `D (N.L) + ks Os (R.V)^n` for one light, where D is `(1 - kt) Od`.
 #[inline(always)]
 fn direct(material: &Material, diffuse: Rgb, point: &SurfacePoint, view: &ViewRay, illumination: &Illumination) -> Rgb {
-    let n_dot_l = illumination.n_dot_l;
-    let mut sum = diffused(diffuse, n_dot_l);
+    let mut sum = diffused(diffuse, illumination.n_dot_l);
     if material.ks != Rgb::ZERO {
-        let reflected = point.normal * (2.0 * n_dot_l) - illumination.to_light;
-        let r_dot_v = -dot(reflected, view.direction);
+        let r_dot_v = r_dot_v(illumination.n_dot_l, point.normal, illumination.to_light, view.direction);
         if r_dot_v > 0.0 {
-            sum += material.ks * material.specular * (highlight(r_dot_v, material.shininess) as f32);
+            sum += glossy(material, r_dot_v);
         }
     }
     sum
+}
+
+/// `R.V`
+#[inline(always)]
+pub(super) fn r_dot_v(n_dot_l: f64, normal: DVec3, to_light: DVec3, view: DVec3) -> f64 {
+    -dot(normal * (2.0 * n_dot_l) - to_light, view)
+}
+
+/// `ks Os (R.V)^n`
+#[inline(always)]
+pub(super) fn glossy(material: &Material, r_dot_v: f64) -> Rgb {
+    material.ks * material.specular * (highlight(r_dot_v, material.shininess) as f32)
 }
 
 /// `D (N.L)`
@@ -206,20 +219,69 @@ fn highlight(x: f64, n: f32) -> f64 {
 /// to just above the horizon: `min(0.9 V.Ng, 0.01)`, the threshold of Cycles' `ensure_valid_specular_reflection`,
 /// which tilts the normal instead.
 fn reflect(point: &SurfacePoint, direction: DVec3) -> DVec3 {
-    let along = dot(direction, point.normal);
-    let mirrored = direction - point.normal * (2.0 * along);
-    let threshold = (-0.9 * dot(direction, point.geometric_normal)).clamp(0.0, 0.01);
-    keep_above(mirrored, point.geometric_normal, threshold)
+    let mirrored = mirrored(direction, point.normal, point.geometric_normal);
+    normalize(mirrored).unwrap_or(point.geometric_normal)
+}
+
+/// The same, of any length.
+#[inline(always)]
+fn mirrored(direction: DVec3, normal: DVec3, geometric_normal: DVec3) -> DVec3 {
+    let along = dot(direction, normal);
+    let mirrored = direction - normal * (2.0 * along);
+    let threshold = (-0.9 * dot(direction, geometric_normal)).clamp(0.0, 0.01);
+    raised(mirrored, geometric_normal, threshold)
 }
 
 /// The unit direction, lifted along `normal` where it does not rise above the surface by at least `threshold`.
 fn keep_above(direction: DVec3, normal: DVec3, threshold: f64) -> DVec3 {
+    normalize(raised(direction, normal, threshold)).unwrap_or(normal)
+}
+
+/// The same, of any length.
+#[inline(always)]
+fn raised(direction: DVec3, normal: DVec3, threshold: f64) -> DVec3 {
     let height = dot(direction, normal);
-    if height >= threshold && height > 0.0 {
-        return normalize(direction).unwrap_or(normal);
-    }
     // For a view within the surface the threshold is 0: any positive height will do.
-    normalize(direction + normal * (threshold.max(1e-6) - height)).unwrap_or(normal)
+    let lifted = direction + normal * (threshold.max(1e-6) - height);
+    let is_above = (height >= threshold) & (height > 0.0);
+    let pick = |direction: f64, lifted: f64| if is_above { direction } else { lifted };
+    DVec3::new(pick(direction.x, lifted.x), pick(direction.y, lifted.y), pick(direction.z, lifted.z))
+}
+
+/// [`reflect`] for each of some points.
+pub(super) fn reflect_all(level: Level, points: &Points, count: usize, directions: &mut Vectors) {
+    let mut odd = [0; LANES];
+    level.run(Reflect { lanes: whole_rows(count), points, directions, odd: &mut odd });
+    for at in (0..count).filter(|&at| odd[at] != 0) {
+        directions.set(at, reflect(&points.get(at), points.direction.get(at)));
+    }
+}
+
+struct Reflect<'a> {
+    lanes: usize,
+    points: &'a Points,
+    directions: &'a mut Vectors,
+    odd: &'a mut Flags,
+}
+
+impl Task for Reflect<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        reflect_lanes(self.lanes, self.points, self.directions, self.odd);
+    }
+}
+
+#[inline(always)]
+fn reflect_lanes(lanes: usize, points: &Points, directions: &mut Vectors, odd: &mut Flags) {
+    for at in 0..lanes.min(LANES) {
+        let (normal, geometric) = (points.normal.get(at), points.geometric_normal.get(at));
+        let mirrored = mirrored(points.direction.get(at), normal, geometric);
+        let squared = dot(mirrored, mirrored);
+        directions.set(at, mirrored / squared.sqrt());
+        odd[at] = u32::from(!((squared >= SAFE.start) & (squared < SAFE.end)));
+    }
 }
 
 /// Snell's law at a point whose inside has index of refraction `ior` relative to the outside.

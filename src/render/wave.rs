@@ -6,12 +6,12 @@
 //! comes where it does in the recursion.
 
 use crate::geometry::Hit;
-use crate::math::lanes::{LANES, Vectors32, whole_rows};
+use crate::math::lanes::{Flags, LANES, Numbers, Vectors, Vectors32, whole_rows};
 use crate::math::simd::{Level, Task};
 use crate::render::answers::{Answers, Meetings};
 use crate::render::points::{Found, Points};
 use crate::render::settings::ThreadSeconds;
-use crate::render::shade::diffused;
+use crate::render::shade::{diffused, glossy, r_dot_v, reflect_all};
 use crate::render::shadow::Illuminations;
 use crate::render::trace::{TracedRay, Tracer, background};
 use crate::scene::camera::ViewRay;
@@ -116,21 +116,23 @@ impl<I: Answers> Tracer<'_, I> {
                 }
                 continue;
             }
+            // Those that are reflected are the next, in order.
+            let mut reflected = next.rays.len() as u32;
+            let reflects = self.reflect_block(block, &meetings, &mut next);
             for at in 0..block.found.count {
                 let (ray, color, number) = (block.found.rays[at], block.color.get(at), block.points.materials[at]);
                 let material = &self.scene.materials[number as usize];
-                let reflects = compiled::REFLECTION && material.is_reflective();
+                let reflects = reflects[at] != 0;
                 let transmits = !self.is_opaque() && material.is_transmissive();
                 if !reflects && !transmits {
                     colors[ray as usize] = self.clamp(color);
                     continue;
                 }
                 colors[ray as usize] = color;
-                meetings.with(at, |here| {
-                    let reflected = reflects.then(|| next.push(self.reflected(here)));
-                    let transmitted = transmits.then(|| next.push(self.transmitted(here, material)));
-                    pending.push(Pending { ray, material: number, reflected, transmitted });
-                });
+                let transmitted =
+                    transmits.then(|| next.push(meetings.with(at, |here| self.transmitted(here, material))));
+                pending.push(Pending { ray, material: number, reflected: reflects.then_some(reflected), transmitted });
+                reflected += u32::from(reflects);
             }
         }
         // The deepest recursion has this batch's colours and hits on every level, but not the rest.
@@ -195,6 +197,29 @@ impl<I: Answers> Tracer<'_, I> {
         }
     }
 
+    /// Adds the mirror rays of a block's points to the next rays, and tells which have one.
+    fn reflect_block(&self, block: &Block, meetings: &Meetings<'_>, next: &mut Rays<I::Ray>) -> Flags {
+        let mut reflects = [0; LANES];
+        let count = block.found.count;
+        let mut any = false;
+        for (flag, &material) in reflects.iter_mut().zip(&block.points.materials[..count]) {
+            let reflective = compiled::REFLECTION && self.scene.materials[material as usize].is_reflective();
+            *flag = u32::from(reflective);
+            any |= reflective;
+        }
+        if any {
+            let mut directions = Vectors::ZERO;
+            reflect_all(Level::chosen(), &block.points, count, &mut directions);
+            self.intersect.rays_outside(meetings, &directions, &reflects, &mut next.rays);
+            let chosen = (0..count).filter(|&at| reflects[at] != 0);
+            let before = next.views.len();
+            let view = |at| ViewRay { origin: block.points.position.get(at), direction: directions.get(at) };
+            next.views.extend(chosen.map(view));
+            self.count(|counts| counts.reflected += (next.views.len() - before) as u64);
+        }
+        reflects
+    }
+
     /// Adds each light's diffuse and specular terms where it is seen.
     fn add_lights(&self, views: &[ViewRay], blocks: &mut [Block]) {
         let mut illuminations = Vec::new();
@@ -227,7 +252,7 @@ impl<I: Answers> Tracer<'_, I> {
                     }
                 }
                 if self.is_opaque() {
-                    self.add_light(views, block, illuminations);
+                    self.add_light(block, illuminations);
                 }
             }
         }
@@ -244,48 +269,106 @@ impl<I: Answers> Tracer<'_, I> {
     }
 
     /// Adds the light of one lamp to all points that it reaches, in a scene that lets no light through.
-    fn add_light(&self, views: &[ViewRay], block: &mut Block, illuminations: &Illuminations) {
-        let count = block.found.count;
-        if block.is_glossy {
-            for at in (0..count).filter(|&at| illuminations.is_lit[at] != 0) {
-                if let Some(illumination) = illuminations.get(at) {
-                    let (point, view) = (block.points.get(at), &views[block.found.rays[at] as usize]);
-                    let more = self.lit(Rgb::ONE, &illumination, block.diffuse.get(at), &point, view);
-                    block.color.set(at, block.color.get(at) + more);
-                }
-            }
-        } else {
-            let (lanes, diffuse, color) = (whole_rows(count), &block.diffuse, &mut block.color);
-            Level::chosen().run(AddDiffuse { lanes, illuminations, diffuse, color });
+    fn add_light(&self, block: &mut Block, illuminations: &Illuminations) {
+        let Block { found, points, diffuse, color, .. } = block;
+        let lanes = whole_rows(found.count);
+        if !block.is_glossy {
+            return Level::chosen().run(AddLight::<false> {
+                lanes,
+                illuminations,
+                diffuse,
+                gloss: &Gloss::NONE,
+                color,
+            });
         }
+        let mut gloss = Gloss::NONE;
+        let mut r_dot_v = [0.0; LANES];
+        Level::chosen().run(Mirrored { lanes, illuminations, points, r_dot_v: &mut r_dot_v });
+        for at in (0..found.count).filter(|&at| illuminations.is_lit[at] != 0 && r_dot_v[at] > 0.0) {
+            let material = &self.scene.materials[points.materials[at] as usize];
+            if material.ks != Rgb::ZERO {
+                gloss.color.set(at, glossy(material, r_dot_v[at]));
+                gloss.is_any[at] = 1;
+            }
+        }
+        Level::chosen().run(AddLight::<true> { lanes, illuminations, diffuse, gloss: &gloss, color });
     }
 }
 
-/// Adds diffuse light where there is any.
-struct AddDiffuse<'a> {
-    lanes: usize,
-    illuminations: &'a Illuminations,
-    diffuse: &'a Vectors32,
-    color: &'a mut Vectors32,
+/// Highlights of points.
+struct Gloss {
+    color: Vectors32,
+    /// Where there is one.
+    is_any: Flags,
 }
 
-impl Task for AddDiffuse<'_> {
+impl Gloss {
+    const NONE: Self = Self { color: Vectors32::ZERO, is_any: [0; LANES] };
+}
+
+/// Finds R.V.
+struct Mirrored<'a> {
+    lanes: usize,
+    illuminations: &'a Illuminations,
+    points: &'a Points,
+    r_dot_v: &'a mut Numbers,
+}
+
+impl Task for Mirrored<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
-        add_diffuse(self.lanes, self.illuminations, self.diffuse, self.color);
+        mirror(self.lanes, self.illuminations, self.points, self.r_dot_v);
     }
 }
 
 #[inline(always)]
-fn add_diffuse(lanes: usize, illuminations: &Illuminations, diffuse: &Vectors32, color: &mut Vectors32) {
+fn mirror(lanes: usize, illuminations: &Illuminations, points: &Points, to: &mut Numbers) {
     for at in 0..lanes.min(LANES) {
+        let (n_dot_l, to_light) = (illuminations.n_dot_l[at], illuminations.to_light.get(at));
+        to[at] = r_dot_v(n_dot_l, points.normal.get(at), to_light, points.direction.get(at));
+    }
+}
+
+/// Adds light where there is any.
+struct AddLight<'a, const GLOSSY: bool> {
+    lanes: usize,
+    illuminations: &'a Illuminations,
+    diffuse: &'a Vectors32,
+    gloss: &'a Gloss,
+    color: &'a mut Vectors32,
+}
+
+impl<const GLOSSY: bool> Task for AddLight<'_, GLOSSY> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        add_light::<GLOSSY>(self.lanes, self.illuminations, self.diffuse, self.gloss, self.color);
+    }
+}
+
+#[inline(always)]
+fn add_light<const GLOSSY: bool>(
+    lanes: usize,
+    illuminations: &Illuminations,
+    diffuse: &Vectors32,
+    gloss: &Gloss,
+    color: &mut Vectors32,
+) {
+    let pick = |choice: bool, yes: Rgb, no: Rgb| {
+        let pick = |yes: f32, no: f32| if choice { yes } else { no };
+        Rgb::new(pick(yes.x, no.x), pick(yes.y, no.y), pick(yes.z, no.z))
+    };
+    for at in 0..lanes.min(LANES) {
+        let mut direct = diffused(diffuse.get(at), illuminations.n_dot_l[at]);
+        if GLOSSY {
+            direct = pick(gloss.is_any[at] != 0, direct + gloss.color.get(at), direct);
+        }
         let before = color.get(at);
-        let after = before + illuminations.color.get(at) * diffused(diffuse.get(at), illuminations.n_dot_l[at]);
-        let is_lit = illuminations.is_lit[at] != 0;
-        let pick = |after: f32, before: f32| if is_lit { after } else { before };
-        color.set(at, Rgb::new(pick(after.x, before.x), pick(after.y, before.y), pick(after.z, before.z)));
+        let after = before + illuminations.color.get(at) * direct;
+        color.set(at, pick(illuminations.is_lit[at] != 0, after, before));
     }
 }
 
