@@ -201,3 +201,20 @@ fn arithmetic_is_the_same_on_every_machine() {
     }
     assert!(wrong.is_empty(), "use `math` or `libm` instead:\n{}", wrong.join("\n"));
 }
+
+#[test]
+fn unsafe_code_is_where_it_is_allowed() {
+    // Vectors in searches, loops compiled for instruction sets, and Embree's library.
+    const ALLOWED: &[&str] = &["accel/wide/simd/mod.rs", "math/simd.rs", "measure/peers/embree/library.rs"];
+    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut files = Vec::new();
+    rust_files(&src, &mut files);
+    let allows = |file: &PathBuf| std::fs::read_to_string(file).unwrap().contains("(unsafe_code");
+    let mut found: Vec<_> = files
+        .into_iter()
+        .filter(allows)
+        .map(|file| file.strip_prefix(&src).unwrap().to_string_lossy().replace('\\', "/"))
+        .collect();
+    found.sort();
+    assert_eq!(found, ALLOWED);
+}

@@ -12,11 +12,12 @@ use whitted::scene::film::Clamp;
 
 #[test]
 fn batches_see_what_the_recursion_sees() {
-    let scenes =
-        ["cornell_box", "glass_over_checker", "mirrors", "quadrics", "seed_camera", "teapot", "textured_crate"];
-    for name in scenes {
+    let shown = ["cornell_box", "glass_over_checker", "mirrors", "quadrics", "seed_camera", "teapot", "textured_crate"];
+    let golden = ["spot_cone", "orthographic", "instances", "normals", "gltf_import", "transparent_shadow"];
+    let scenes = shown.map(|name| format!("scenes/{name}.toml"));
+    for name in scenes.into_iter().chain(golden.map(|name| format!("tests/golden/{name}.toml"))) {
         for clamp in [Clamp::Shade, Clamp::Output] {
-            let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{name}.toml"));
+            let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(&name);
             let mut scene = formats::open(&file, &LoadOptions::default(), &Silent).unwrap().scene;
             // Neither size is a multiple of the side of a block of pixels.
             (scene.film.width, scene.film.height, scene.film.samples) = (41, 27, 3);

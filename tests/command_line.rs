@@ -281,6 +281,13 @@ fn threads_and_accelerators_do_not_change_a_byte() {
     ] {
         assert!(workshop.png(&format!("--size 40x30 --spp 2 {flags}")) == reference, "{flags}");
     }
+    for simd in ["portable", "avx2", "avx512"] {
+        let mut command = workshop.command("render model.obj --size 40x30 --spp 2 -o -");
+        let output = command.env("WHITTED_SIMD", simd).output().unwrap();
+        assert!(output.status.success() && output.stdout == reference, "{simd}");
+    }
+    let output = workshop.command("render model.obj --size 4x3 -o -").env("WHITTED_SIMD", "avx-512").output().unwrap();
+    assert!(output.status.success() && text(&output.stderr).contains("avx-512"), "{}", text(&output.stderr));
 }
 
 /// The first and last column and row, from 0, in which a ray hits something.
@@ -639,14 +646,12 @@ fn a_limit_of_memory_chooses_the_compact_structure_or_refuses() {
     assert!(same == picture);
     // Between what the two take while they are built.
     let triangles = 2 * SIDE * SIDE;
-    let others = json["bytes"]["geometry"].as_u64().unwrap() + 32 * 20 * 10;
+    let others = json["bytes"]["geometry"].as_u64().unwrap() + 40 * 20 * 10;
     let limit = others + triangles * (36 + 512 + 35);
     let (json, same) = render(&format!("--memory-limit {limit}"));
     assert_eq!(json["settings"]["accelerator"], "compact");
     assert!(json["bytes"]["tree_leaves"].as_u64().unwrap() < 5 * triangles);
     assert!(same == picture);
-    // Without a size the picture is larger.
-    let limit = limit + 32 * (1280 * 720 - 20 * 10);
     let info: Value =
         serde_json::from_slice(&workshop.succeed(&format!("info hills.obj --tree --json --memory-limit {limit}")))
             .unwrap();
@@ -654,6 +659,8 @@ fn a_limit_of_memory_chooses_the_compact_structure_or_refuses() {
     assert!(info["tree"]["bytes_per_triangle"].as_f64().unwrap() < 24.0);
     let refused = workshop.fail("render hills.obj --memory-limit 1M");
     assert!(refused.contains("MiB") && refused.contains("raise the limit"), "{refused}");
+    let exact = workshop.fail("render hills.obj --memory-limit 2G --precision f64");
+    assert!(exact.contains("--precision f64"), "{exact}");
     let both = workshop.run("render hills.obj --memory-limit 1M --accelerator wide");
     assert_eq!(both.status.code(), Some(2), "{}", text(&both.stderr));
 }

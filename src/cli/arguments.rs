@@ -14,7 +14,7 @@ use super::query::QueryArguments;
 use super::report::ReportArguments;
 use super::values::{self, Orbit, one_of};
 use crate::accel::{Kind, Params, Preset};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::formats::{LoadOptions, NormalMode, UpAxis};
 use crate::render::{AovKind, Crop, RenderSettings};
 use crate::scene::auto::View;
@@ -255,16 +255,27 @@ impl LoadArguments {
 }
 
 impl BuildArguments {
-    /// As the builders take them, for a scene.
+    /// As the builders take them, for a scene and a picture that takes so many bytes.
     ///
     /// # Errors
     /// When nothing fits the limit of memory.
-    pub fn params(&self, scene: &Scene) -> Result<Params> {
+    pub fn params(&self, scene: &Scene, picture: u64) -> Result<Params> {
         let kind = match self.memory_limit {
-            Some(limit) => kind_within(limit, scene)?,
+            Some(limit) => kind_within(limit, scene, picture)?,
             None => self.accelerator,
         };
         Ok(Params { kind, preset: self.preset })
+    }
+}
+
+impl BuildArguments {
+    /// Says that nothing keeps a limit of memory with a flag that leaves no choice of structures.
+    pub fn refuse_limit(&self, flag: &str) -> Result<()> {
+        match self.memory_limit {
+            Some(_) => Err(Error::caller(format!("--memory-limit chooses a structure, and {flag} has its own"))
+                .remedy(format!("leave out --memory-limit or {flag}"))),
+            None => Ok(()),
+        }
     }
 }
 

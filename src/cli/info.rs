@@ -152,7 +152,7 @@ pub fn run(arguments: &InfoArguments) -> Result<()> {
     ledger::report(&ledger, false);
     let mut info = Info::of(&arguments.input, &scene, &ledger);
     if arguments.tree || arguments.validate {
-        let renderer = arguments.build.params(&scene).and_then(|params| Renderer::build(scene, &params, &terminal));
+        let renderer = arguments.build.params(&scene, 0).and_then(|params| Renderer::build(scene, &params, &terminal));
         terminal.clear();
         info.tree = Some(Tree::of(&renderer?, arguments)?);
     }

@@ -32,6 +32,7 @@ use std::process::ExitCode;
 pub use arguments::Arguments;
 
 use crate::error::{Error, Fault, Result};
+use crate::math::simd::{Level, VARIABLE};
 use arguments::Command;
 
 /// Exit code of a command that failed.
@@ -44,6 +45,13 @@ const INTERRUPTED: u8 = 130;
 /// # Errors
 /// Whatever stopped it; [`Fault::Cancelled`] after an interrupt.
 pub fn run(arguments: &Arguments) -> Result<()> {
+    if let Some(name) = Level::refused() {
+        let known: Vec<_> = Level::available().map(Level::name).collect();
+        let known = known.join(", ");
+        terminal::report(&format!(
+            "warning: {VARIABLE}: this processor has no `{name}`, but {known}; the last of them is used"
+        ));
+    }
     match &arguments.command {
         Command::Render(arguments) => render::run(arguments),
         Command::Info(arguments) => info::run(arguments),

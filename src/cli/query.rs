@@ -212,10 +212,11 @@ impl Answerer {
     fn build(scene: Scene, arguments: &QueryArguments, progress: &dyn Progress) -> Result<Self> {
         match arguments.precision {
             Precision::F32 => {
-                let params = arguments.build.params(&scene)?;
+                let params = arguments.build.params(&scene, 0)?;
                 Ok(Self::F32(Box::new(Renderer::build(scene, &params, progress)?)))
             }
             Precision::Exact => {
+                arguments.build.refuse_limit("--precision exact")?;
                 let oracle = Box::new(Oracle::new(&scene)?);
                 Ok(Self::Exact(Box::new(scene), oracle))
             }

@@ -4,8 +4,9 @@ use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 use super::arguments::RenderArguments;
+use super::memory_limit::picture_bytes;
 use super::outputs::{Outputs, Picture};
-use super::precision::AnyRenderer;
+use super::precision::{AnyRenderer, Precision};
 use super::stats_json::{Bytes, SCHEMA, Seconds, Settings, Stats, timed};
 use super::terminal::{self, Terminal};
 use super::{camera, ledger, outputs};
@@ -56,14 +57,18 @@ pub fn run(arguments: &RenderArguments) -> Result<()> {
         formats::scene_file::save_model_scene(&scene, &arguments.input, &options, path)?;
     }
 
-    let params = arguments.build.params(&scene)?;
+    let settings = arguments.settings();
+    if arguments.precision == Precision::F64 {
+        arguments.build.refuse_limit("--precision f64")?;
+    }
+    let picture = picture_bytes(&scene.film, settings.crop, &settings.aovs);
+    let params = arguments.build.params(&scene, picture)?;
     let renderer;
     (renderer, seconds.build) = timed(|| AnyRenderer::build(scene, arguments.precision, &params, &terminal));
     terminal.clear();
     let renderer = renderer?;
     report_time("build", seconds.build);
 
-    let settings = arguments.settings();
     let film;
     (film, seconds.render) = timed(|| renderer.render(&settings, &terminal));
     terminal.clear();

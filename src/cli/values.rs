@@ -82,12 +82,12 @@ pub fn bytes(text: &str) -> Result<u64, String> {
     let expected = || "expected a number and a unit, such as 800M or 4G".to_owned();
     let digits = text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len());
     let (number, unit) = text.split_at(digits);
-    let shift = match unit.to_ascii_lowercase().trim_end_matches('b').trim_end_matches('i') {
-        "" => 0,
-        "k" => 10,
-        "m" => 20,
-        "g" => 30,
-        "t" => 40,
+    let shift = match unit.to_ascii_lowercase().as_str() {
+        "" | "b" => 0,
+        "k" | "kb" | "kib" => 10,
+        "m" | "mb" | "mib" => 20,
+        "g" | "gb" | "gib" => 30,
+        "t" | "tb" | "tib" => 40,
         _ => return Err(expected()),
     };
     let number: f64 = number.trim_end().parse().map_err(|_| expected())?;
@@ -129,7 +129,7 @@ mod tests {
         {
             assert_eq!(bytes(text), Ok(expected), "{text}");
         }
-        for bad in ["", "M", "-1G", "0", "1X", "1e30", "nan", "4 G B", "inf"] {
+        for bad in ["", "M", "-1G", "0", "1X", "1e30", "nan", "4 G B", "inf", "4gbb", "1Mii", "5gi", "800i"] {
             assert!(bytes(bad).unwrap_err().contains("800M"), "{bad}");
         }
     }

@@ -210,6 +210,24 @@ mod tests {
     }
 
     #[test]
+    fn boxes_of_hits_are_the_same_number_by_number() {
+        use crate::math::random::Random;
+        let mut random = Random::new(5, 0x7219);
+        for number in 0..20_000 {
+            let scale = libm::exp2(random.between(-140.0, 60.0)) as f32;
+            let mut corners = [(); 3].map(|()| random.in_cube().as_vec3() * scale);
+            match number % 5 {
+                0 => corners[1][number % 3] = corners[0][number % 3],
+                1 => corners.iter_mut().for_each(|corner| corner[number % 3] = scale),
+                2 => corners.iter_mut().for_each(|corner| corner[number % 3] += 1e3),
+                _ => {}
+            }
+            let (one, other) = (hit_bounds(corners), hit_bounds_by_number(corners));
+            assert_eq!((one.min, one.max), (other.min, other.max), "{corners:?}");
+        }
+    }
+
+    #[test]
     fn barycentrics_weigh_b_and_c() {
         for direction in [Vec3::Z, Vec3::Z * 4.0] {
             let found = hit(Ray::new(Vec3::new(0.25, 0.5, 0.0), direction)).unwrap();

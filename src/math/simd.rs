@@ -71,6 +71,13 @@ impl Level {
         })
     }
 
+    /// What [`VARIABLE`] asks for, if this processor does not have it.
+    pub fn refused() -> Option<String> {
+        let wanted = std::env::var_os(VARIABLE)?.to_string_lossy().into_owned();
+        let is_known = Self::available().any(|level| level.name() == wanted);
+        (!wanted.is_empty() && !is_known).then_some(wanted)
+    }
+
     /// What the set is called in reports and in [`VARIABLE`].
     pub fn name(self) -> &'static str {
         match self.0 {

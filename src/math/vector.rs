@@ -26,6 +26,13 @@ pub fn cross(a: DVec3, b: DVec3) -> DVec3 {
 /// Squares of lengths of which the root loses nothing.
 pub const SAFE: std::ops::Range<f64> = 1e-200..1e200;
 
+/// Whether a square is [`SAFE`], without a branch.
+#[expect(clippy::manual_range_contains, reason = "that has a branch")]
+#[inline(always)]
+pub fn is_safe(squared: f64) -> bool {
+    (squared >= SAFE.start) & (squared < SAFE.end)
+}
+
 /// Euclidean length, f64. Does not guard against overflow: components beyond 1e150 give infinity.
 #[inline(always)]
 pub fn length(a: DVec3) -> f64 {

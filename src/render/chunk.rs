@@ -124,7 +124,7 @@ impl Task for Fill<'_, '_> {
     #[inline(always)]
     fn run(self) -> bool {
         let Self { chunk, rays } = self;
-        let rays = &rays[..rays.len().min(CHUNK)];
+        assert!(rays.len() <= CHUNK, "no more rays than a chunk holds");
         let lanes = rays.len().next_multiple_of(ROW);
         for (at, ray) in rays.iter().enumerate() {
             for axis in 0..3 {

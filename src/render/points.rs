@@ -6,7 +6,7 @@ use crate::geometry::{Hit, TriangleMesh};
 use crate::math::Transform;
 use crate::math::lanes::{Flags, LANES, Numbers, Vectors, Vectors32, whole_rows};
 use crate::math::simd::{Level, Task};
-use crate::math::vector::{SAFE, dot};
+use crate::math::vector::{dot, is_safe};
 use crate::render::surface::{Place, SurfacePoint, interpolated, on_side_of, solve};
 use crate::render::world::{Instance, World};
 use crate::scene::camera::ViewRay;
@@ -101,6 +101,7 @@ impl Points {
     }
 
     /// Finds the points of hits that lie on one instance: [`SurfacePoint::of`] for each.
+    #[inline(never)]
     pub fn solve(&mut self, level: Level, scene: &Scene, world: &World, views: &[ViewRay], found: &Found) {
         let Some(first) = found.hits[..found.count].first() else { return };
         let instance = &world.instances[first.instance as usize];
@@ -270,12 +271,68 @@ fn smooth<const MOVED: bool>(lanes: usize, transform: &Transform, given: &Given,
         let (local, is_given) = interpolated(corners, [place.x, place.y, place.z]);
         let world = if MOVED { transform.normal_to_world(local) } else { local };
         let squared = dot(world, world);
-        let is_regular = (squared >= SAFE.start) & (squared < SAFE.end);
+        let is_regular = is_safe(squared);
         let face = points.geometric_normal.get(at);
         let normal = on_side_of(world / squared.sqrt(), face);
         let pick = |smooth: f64, flat: f64| if is_given { smooth } else { flat };
         let normal = DVec3::new(pick(normal.x, face.x), pick(normal.y, face.y), pick(normal.z, face.z));
         points.normal.set(at, normal);
         odd[at] |= u32::from(is_given & !is_regular);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::Random;
+    use crate::scene::{Material, Object};
+    use glam::DAffine3;
+    use std::sync::Arc;
+
+    /// Triangles with normals, some of which are not given.
+    fn mesh(random: &mut Random) -> TriangleMesh {
+        let positions: Vec<_> = (0..3 * LANES).map(|_| random.in_cube().as_vec3()).collect();
+        let indices = (0..LANES as u32).map(|n| [3 * n, 3 * n + 1, 3 * n + 2]).collect();
+        let normals = (0..positions.len()).map(|number| match number % 11 {
+            0 => Vec3::ZERO,
+            1 => random.direction().as_vec3() * 1e-20,
+            _ => random.direction().as_vec3(),
+        });
+        let normals = Some(normals.collect());
+        TriangleMesh { positions, indices, normals, ..TriangleMesh::default() }.finish().unwrap()
+    }
+
+    #[test]
+    fn points_of_many_hits_are_those_of_each() {
+        let mut random = Random::new(9, 0x9017);
+        let mesh = Arc::new(mesh(&mut random));
+        // At the last scales the squares of normals leave f64, and points are found one by one.
+        for scale in [1.0, -0.75, 1e-3, 1e101, 1e-101] {
+            let transform = DAffine3::from_scale(DVec3::new(scale, scale.abs(), scale));
+            let object = Object { name: String::new(), shape: Shape::Mesh(0), transform, material: Some(0) };
+            let materials = vec![Material::default()];
+            let scene = Scene { meshes: vec![mesh.clone()], objects: vec![object], materials, ..Scene::default() };
+            let world = World::new(&scene).unwrap();
+            for count in [1, 7, 8, 9, LANES] {
+                let mut found = Found::NONE;
+                let views: Vec<_> = (0..count)
+                    .map(|_| ViewRay { origin: random.in_cube() * scale, direction: random.direction() })
+                    .collect();
+                for ray in 0..count as u32 {
+                    let primitive = random.below(LANES as u64) as u32;
+                    found.push(ray, Hit { t: 1.0, u: 0.25, v: 0.5, instance: 0, primitive });
+                }
+                for level in Level::available() {
+                    let mut points = Points::NONE;
+                    points.solve(level, &scene, &world, &views, &found);
+                    for at in 0..count {
+                        let expected = SurfacePoint::of(&scene, &world, &views[at], &found.hits[at]);
+                        let [one, other] = [points.get(at), expected].map(|point| format!("{point:?}"));
+                        assert_eq!(one, other, "{}, scale {scale}", level.name());
+                        assert_eq!(points.direction.get(at), views[at].direction);
+                    }
+                }
+            }
+        }
     }
 }

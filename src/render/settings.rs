@@ -60,10 +60,10 @@ impl std::ops::AddAssign for RayCounts {
 pub struct ThreadSeconds {
     /// Finding what rays hit, and whether lights are seen.
     pub traversal: f64,
-    /// Finding surface points and colours, and making the rays that leave them. Light that passes through transparent surfaces is
-    /// followed here.
+    /// Finding surface points and colours, and making the rays that leave them. Light that passes through transparent surfaces and
+    /// the entries of edges are followed here.
     pub shading: f64,
-    /// The rest: sample positions, camera rays, sums over pixels, and waiting for the last tiles.
+    /// The rest: sample positions, camera rays, extra values, sums over pixels, and waiting for the last tiles.
     pub rest: f64,
 }
 
@@ -82,7 +82,7 @@ pub struct RenderStats {
     pub rays: RayCounts,
     /// Wall-clock seconds from the first camera ray to the finished linear film.
     pub seconds: f64,
-    /// The same for each thread, by what was done.
+    /// What threads did in that time.
     pub thread_seconds: ThreadSeconds,
     /// Threads that were used.
     pub threads: usize,

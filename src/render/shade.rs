@@ -6,7 +6,7 @@ use glam::DVec3;
 use crate::geometry::Hit;
 use crate::math::lanes::{Flags, LANES, Vectors, whole_rows};
 use crate::math::simd::{Level, Task};
-use crate::math::vector::{SAFE, dot, normalize};
+use crate::math::vector::{dot, is_safe, normalize};
 use crate::render::answers::{Answers, Meeting};
 use crate::render::points::Points;
 use crate::render::shadow::{Illumination, PreparedLight};
@@ -280,7 +280,7 @@ fn reflect_lanes(lanes: usize, points: &Points, directions: &mut Vectors, odd: &
         let mirrored = mirrored(points.direction.get(at), normal, geometric);
         let squared = dot(mirrored, mirrored);
         directions.set(at, mirrored / squared.sqrt());
-        odd[at] = u32::from(!((squared >= SAFE.start) & (squared < SAFE.end)));
+        odd[at] = u32::from(!is_safe(squared));
     }
 }
 

@@ -5,7 +5,7 @@ use glam::DVec3;
 use crate::error::{Error, Result};
 use crate::math::lanes::{Flags, LANES, Numbers, Vectors, Vectors32, whole_rows};
 use crate::math::simd::{Level, Task};
-use crate::math::vector::{SAFE, dot, normalize};
+use crate::math::vector::{dot, is_safe, normalize};
 use crate::render::answers::{Answers, Meeting};
 use crate::render::points::Points;
 use crate::render::surface::SurfacePoint;
@@ -228,7 +228,7 @@ fn illuminate(lanes: usize, light: &PreparedLight, points: &Points, found: &mut 
     for at in 0..lanes.min(LANES) {
         let (offset, is_apart) = light.offset(points.position.get(at));
         let squared = dot(offset, offset);
-        let is_regular = light.is_distant | (squared >= SAFE.start) & (squared < SAFE.end);
+        let is_regular = light.is_distant | is_safe(squared);
         let to_light = if light.is_distant { offset } else { offset / squared.sqrt() };
         let (n_dot_l, color, is_lit) = light.shine(to_light, squared, points.normal.get(at));
         found.to_light.set(at, to_light);

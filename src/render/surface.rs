@@ -6,7 +6,7 @@ use crate::geometry::triangle::hit_bounds_by_number;
 use crate::geometry::{Bounds, Hit, Quadric};
 use crate::math::Transform;
 use crate::math::float::{gamma, round_down, round_up};
-use crate::math::vector::{SAFE, cross, dot, normal_and_length, normalize};
+use crate::math::vector::{cross, dot, is_safe, normal_and_length, normalize};
 use crate::render::world::{Instance, World};
 use crate::scene::camera::ViewRay;
 use crate::scene::{Scene, Shape, compiled};
@@ -259,7 +259,7 @@ pub(super) fn solve<const MOVED: bool>(
     let face = cross(b - a, c - a);
     let squared = dot(face, face);
     let length = squared.sqrt();
-    let mut is_regular = (squared >= SAFE.start) & (squared < SAFE.end);
+    let mut is_regular = is_safe(squared);
     let mut outward = face / length;
     let mut offset = test_error(position, weights, corners, (outward, length));
     if MOVED {
@@ -267,7 +267,7 @@ pub(super) fn solve<const MOVED: bool>(
         let normal = transform.normal_to_world(outward);
         let squared = dot(normal, normal);
         let length = squared.sqrt();
-        is_regular &= (squared >= SAFE.start) & (squared < SAFE.end);
+        is_regular &= is_safe(squared);
         position = transform.point_to_world(position);
         // Planes a distance 1 apart in object space are 1 / |M^-T n| apart in the world.
         (outward, offset) = (normal / length, error / length);

@@ -44,8 +44,9 @@ struct Block {
 
 const MIXED: u32 = u32::MAX;
 
-/// So many instances have blocks of their own at a time.
-const MOST_OPEN: usize = 8;
+/// Once a batch has so many blocks, twice those that its rays fill, what hits other instances goes to the mixed one: blocks of few hits are
+/// slower than hits one by one.
+const MOST_BLOCKS: usize = 2 * LARGEST / LANES;
 
 /// What a ray's colour still lacks.
 struct Pending {
@@ -154,7 +155,9 @@ impl<I: Answers> Tracer<'_, I> {
         (colors, hits)
     }
 
-    /// Finds the points of a block's hits, and corrects hits behind which a ray came in.
+    /// Out of line, as the next ones, since the deepest recursion must not have their arrays on every level. Finds the points of a
+    /// block's hits, and corrects hits behind which a ray came in.
+    #[inline(never)]
     fn meet_all(&self, traced: &Rays<I::Ray>, block: &mut Block, hits: &mut [Hit]) {
         let Block { found, points, .. } = block;
         if block.instance == MIXED {
@@ -198,6 +201,7 @@ impl<I: Answers> Tracer<'_, I> {
     }
 
     /// Adds the mirror rays of a block's points to the next rays, and tells which have one.
+    #[inline(never)]
     fn reflect_block(&self, block: &Block, meetings: &Meetings<'_>, next: &mut Rays<I::Ray>) -> Flags {
         let mut reflects = [0; LANES];
         let count = block.found.count;
@@ -221,6 +225,7 @@ impl<I: Answers> Tracer<'_, I> {
     }
 
     /// Adds each light's diffuse and specular terms where it is seen.
+    #[inline(never)]
     fn add_lights(&self, views: &[ViewRay], blocks: &mut [Block]) {
         let mut illuminations = Vec::new();
         illuminations.resize_with(blocks.len(), || Illuminations::NONE);
@@ -393,10 +398,11 @@ impl Blocks {
     }
 
     /// A block with room, the last of the open ones afterwards.
+    #[inline(never)]
     fn block_for(&mut self, instance: u32) -> usize {
         let find = |open: &[(u32, usize)], key: u32| open.iter().position(|(of, _)| *of == key);
         let (key, open) = match find(&self.open, instance) {
-            None if self.open.len() >= MOST_OPEN => (MIXED, find(&self.open, MIXED)),
+            None if self.all.len() >= MOST_BLOCKS => (MIXED, find(&self.open, MIXED)),
             found => (instance, found),
         };
         let block = open.map(|at| self.open.remove(at).1).filter(|&block| !self.all[block].found.is_full());

@@ -5,7 +5,7 @@ use glam::{DVec2, DVec3};
 use crate::error::{Error, Result};
 use crate::math::lanes::{Flags, LANES, Vectors};
 use crate::math::simd::{Level, Task};
-use crate::math::vector::{SAFE, cross, dot, normalize};
+use crate::math::vector::{cross, dot, is_safe, normalize};
 
 /// A camera with its name in the file.
 #[derive(Debug, Clone, PartialEq)]
@@ -225,7 +225,7 @@ fn form(camera: &CameraRays, x: &[f64], y: &[f64], formed: &mut Formed) {
     for at in 0..count {
         let (origin, direction) = camera.line(x[at], y[at]);
         let squared = dot(direction, direction);
-        let is_regular = is_unit | (squared >= SAFE.start) & (squared < SAFE.end);
+        let is_regular = is_unit | is_safe(squared);
         formed.origin.set(at, origin);
         formed.direction.set(at, if is_unit { direction } else { direction / squared.sqrt() });
         formed.is_odd[at] = u32::from(!is_regular);

@@ -49,7 +49,7 @@ impl Structure {
         let answer = Answer { hit: self.renderer.closest(ray), occluded: self.renderer.occluded(ray) };
         let words: [u32; 8] = bytemuck::cast(*ray);
         let drawn = words.into_iter().fold(0, hash2);
-        if self.params.kind.resolve() != Kind::Wide || !drawn.is_multiple_of(16) {
+        if !matches!(self.params.kind.resolve(), Kind::Wide | Kind::Compact) || !drawn.is_multiple_of(16) {
             return answer;
         }
         let together = self.ask_with_neighbors(ray, (drawn / 16) as usize % TOGETHER);
