@@ -138,7 +138,7 @@ impl Points {
         self.solve_odd(scene, world, views, found, &odd);
     }
 
-    #[allow(clippy::too_many_arguments)]
+    #[expect(clippy::too_many_arguments, reason = "the second half of `solve`")]
     fn shade_smoothly(
         &mut self,
         level: Level,

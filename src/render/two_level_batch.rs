@@ -46,7 +46,7 @@ impl<T> Group<T> {
             self.clips.clear();
             self.rays.extend(self.places.iter().map(|&place| rays[usize::from(place)]));
         } else if self.places.len() < rays.len() / 8 {
-            // The loop over all would take longer.
+            // The loop is over all of them, eight at a time at most.
             self.rays.extend(self.places.iter().map(|&place| {
                 let ray = rays[usize::from(place)];
                 let (origin, direction) = instance.local_line(ray.origin.as_dvec3(), ray.direction.as_dvec3());

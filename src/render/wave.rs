@@ -44,8 +44,8 @@ struct Block {
 
 const MIXED: u32 = u32::MAX;
 
-/// Once a batch has so many blocks, twice those that its rays fill, what hits other instances goes to the mixed one: blocks of few hits are
-/// slower than hits one by one.
+/// Once a batch has so many blocks, twice those that its rays fill, what hits other instances goes to the mixed one, so that many
+/// instances do not each make a block.
 const MOST_BLOCKS: usize = 2 * LARGEST / LANES;
 
 /// What a ray's colour still lacks.

@@ -179,17 +179,14 @@ fn cut_all(references: &mut [Reference]) -> Part<'_> {
     cut(references, 0)
 }
 
-/// A chunk for each reference.
+/// A chunk for each reference, of which there is at least one.
 fn each(references: &[Reference]) -> Part<'_> {
-    let (first, second) = references.split_at(references.len() / 2);
-    let bounds = Bounds::EMPTY;
-    match (first, second) {
-        ([], [one]) => Part { bounds: one.bounds, content: Content::Chunk(second) },
-        _ => {
-            let pair = [each(first), each(second)];
-            Part { bounds: bounds.union(pair[0].bounds).union(pair[1].bounds), content: Content::Pair(Box::new(pair)) }
-        }
+    if let [one] = references {
+        return Part { bounds: one.bounds, content: Content::Chunk(references) };
     }
+    let (first, second) = references.split_at(references.len() / 2);
+    let pair = [each(first), each(second)];
+    Part { bounds: pair[0].bounds.union(pair[1].bounds), content: Content::Pair(Box::new(pair)) }
 }
 
 fn cut(references: &mut [Reference], depth: usize) -> Part<'_> {
