@@ -20,7 +20,7 @@ use whitted::scene::{
 fn checker() -> Texture {
     let (dark, light) = ([60, 70, 90, 255], [225, 220, 205, 255]);
     let texels = Texels::Srgb8(vec![dark, light, light, dark].into());
-    Texture { name: "checker".into(), width: 2, height: 2, texels, wrap: [Wrap::Repeat; 2], filter: Filter::Nearest }
+    Texture { filter: Filter::Nearest, ..Texture::new("checker", 2, 2, texels) }
 }
 
 /// One triangle, counter-clockwise seen from the camera.

@@ -15,7 +15,7 @@ use super::report::ReportArguments;
 use super::values::{self, Orbit, one_of};
 use crate::accel::{Kind, Params, Preset};
 use crate::error::{Error, Result};
-use crate::formats::{LoadOptions, NormalMode, UpAxis};
+use crate::formats::{Limits, LoadOptions, NormalMode, UpAxis};
 use crate::render::{AovKind, Crop, RenderSettings};
 use crate::scene::auto::View;
 use crate::scene::film::{LARGEST_DEPTH, MOST_SAMPLES};
@@ -162,6 +162,31 @@ pub struct LoadArguments {
     /// Shading normals: those of the file, none, or computed from the faces.
     #[arg(long, value_name = "MODE", value_parser = one_of(NORMAL_MODES), default_value = "file")]
     pub normals: NormalMode,
+    /// Where an OBJ file has neither normals nor smoothing groups: smooth edges between faces that meet at less than this angle.
+    #[arg(long, value_name = "DEGREES", value_parser = values::angle)]
+    pub crease_angle: Option<f64>,
+    /// Which scene of a glTF file, by name or number from 0; without it the file's default.
+    #[arg(long, value_name = "SCENE")]
+    pub scene: Option<String>,
+    /// The time in seconds at which a glTF file's animation is shown; without it nothing is animated.
+    #[arg(long, value_name = "SECONDS", value_parser = values::seconds, allow_hyphen_values = true)]
+    pub time: Option<f64>,
+    /// Which animation of a glTF file, by name or number from 0.
+    #[arg(long, value_name = "ANIMATION", requires = "time", default_value = "0")]
+    pub animation: String,
+    /// Do not show the back of what a glTF file calls single-sided.
+    #[arg(long)]
+    pub cull_back_faces: bool,
+    /// Fail where something in a file is ignored, approximated or wrong, instead of doing without it.
+    #[arg(long)]
+    pub strict: bool,
+    /// Also read files outside the model's folder that the model names.
+    #[arg(long)]
+    pub allow_external: bool,
+    /// Change how much a file may ask for: file-bytes, vertices, texels (of an image), depth (of nodes), data-uri-bytes. May be
+    /// given several times.
+    #[arg(long, value_name = "NAME=N", value_parser = values::limit)]
+    pub limit: Vec<(String, u64)>,
 }
 
 /// Flags for acceleration structures and threads. None of them changes a pixel.
@@ -250,7 +275,22 @@ impl FilmArguments {
 impl LoadArguments {
     /// As the readers take them.
     pub fn options(&self) -> LoadOptions {
-        LoadOptions { normals: self.normals, up: self.up, ..LoadOptions::default() }
+        let mut limits = Limits::default();
+        for (name, value) in &self.limit {
+            limits.by_name().into_iter().filter(|(known, _)| known == name).for_each(|(_, limit)| *limit = *value);
+        }
+        LoadOptions {
+            normals: self.normals,
+            up: self.up,
+            faces: false,
+            crease_angle: self.crease_angle,
+            scene: self.scene.clone(),
+            animation: self.time.map(|_| self.animation.clone()),
+            time: self.time,
+            cull_back_faces: self.cull_back_faces,
+            allow_external: self.allow_external,
+            limits,
+        }
     }
 }
 

@@ -5,6 +5,7 @@ use std::str::FromStr;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
+use crate::formats::Limits;
 use crate::render::Crop;
 use crate::scene::film::{LARGEST_EXPOSURE, LONGEST_SIDE};
 
@@ -66,6 +67,33 @@ pub fn field_of_view(text: &str) -> Result<f64, String> {
         // The second conversion makes it a value that a scene file, which has degrees, gives back exactly.
         Ok(degrees) if degrees > 0.0 && degrees < 180.0 => Ok(degrees.to_radians().to_degrees().to_radians()),
         _ => Err("expected degrees between 0 and 180, both excluded".into()),
+    }
+}
+
+/// Reads an angle in degrees between 0 and 180, in radians.
+pub fn angle(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(degrees) if (0.0..=180.0).contains(&degrees) => Ok(degrees.to_radians()),
+        _ => Err("expected degrees from 0 to 180".into()),
+    }
+}
+
+/// Reads a time in seconds.
+pub fn seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if seconds.is_finite() => Ok(seconds),
+        _ => Err("expected seconds, such as 1.5".into()),
+    }
+}
+
+/// Reads a limit of what is read: `texels=1G`.
+pub fn limit(text: &str) -> Result<(String, u64), String> {
+    let names = Limits::default().by_name().map(|(name, _)| name);
+    let (name, value) = text.split_once('=').ok_or("expected NAME=N, such as texels=1G")?;
+    if names.contains(&name) {
+        Ok((name.to_owned(), bytes(value)?))
+    } else {
+        Err(format!("known are {}", names.join(", ")))
     }
 }
 

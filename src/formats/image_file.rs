@@ -13,7 +13,7 @@ use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 
 use crate::error::{Error, Result};
 use crate::scene::Texture;
-use crate::scene::texture::{Filter, Texels, Wrap};
+use crate::scene::texture::Texels;
 
 /// Formats that are read, for messages.
 const ACCEPTED: &str = "accepted are PNG, JPEG, WebP, TGA, BMP, HDR and EXR";
@@ -68,7 +68,7 @@ pub fn decode_texture(bytes: &[u8], name: &str) -> Result<Texture> {
     if width == 0 || height == 0 {
         return Err(Error::file("the image has no texels"));
     }
-    Ok(Texture { name: name.to_owned(), width, height, texels, wrap: [Wrap::Repeat; 2], filter: Filter::Linear })
+    Ok(Texture::new(name, width, height, texels))
 }
 
 /// The format by content, else by suffix.

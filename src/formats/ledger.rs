@@ -17,10 +17,28 @@ pub enum Treatment {
     Warning,
 }
 
+/// What of a scene a feature belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Scope {
+    /// All triangles of a material, by its position in the list of materials.
+    Material(u32),
+    /// All triangles of a mesh, by its position in the list of meshes.
+    Mesh(u32),
+}
+
+/// One feature, as it was met.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Entry {
+    /// How often.
+    pub count: u64,
+    /// What it belongs to; nothing for what belongs to the file as a whole.
+    pub scopes: BTreeSet<Scope>,
+}
+
 /// Features met in a file, with counts, and the files that were read for it.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Ledger {
-    entries: BTreeMap<(Treatment, String), u64>,
+    entries: BTreeMap<(Treatment, String), Entry>,
     files: BTreeSet<PathBuf>,
 }
 
@@ -28,7 +46,28 @@ impl Ledger {
     /// Adds `count` occurrences of a feature. The text is one line, such as "map_bump" or
     /// "material library `a.mtl` is missing: neutral material used".
     pub fn note(&mut self, treatment: Treatment, feature: impl Into<String>, count: u64) {
-        *self.entries.entry((treatment, feature.into())).or_default() += count;
+        self.entries.entry((treatment, feature.into())).or_default().count += count;
+    }
+
+    /// Adds an occurrence of a feature that belongs to a material or a mesh.
+    pub fn note_in(&mut self, treatment: Treatment, feature: impl Into<String>, scope: Scope) {
+        let entry = self.entries.entry((treatment, feature.into())).or_default();
+        entry.count += 1;
+        entry.scopes.insert(scope);
+    }
+
+    /// Moves what features belong to, when a model's lists are appended to a scene's that have so many materials and meshes.
+    pub fn shift(&mut self, materials: u32, meshes: u32) {
+        for entry in self.entries.values_mut() {
+            entry.scopes = entry
+                .scopes
+                .iter()
+                .map(|scope| match scope {
+                    Scope::Material(number) => Scope::Material(number + materials),
+                    Scope::Mesh(number) => Scope::Mesh(number + meshes),
+                })
+                .collect();
+        }
     }
 
     /// Records a file that is read, so that nothing is written over it.
@@ -44,14 +83,21 @@ impl Ledger {
     /// Adds all of another ledger.
     pub fn merge(&mut self, other: Self) {
         self.files.extend(other.files);
-        for ((treatment, feature), count) in other.entries {
-            self.note(treatment, feature, count);
+        for (key, other) in other.entries {
+            let entry = self.entries.entry(key).or_default();
+            entry.count += other.count;
+            entry.scopes.extend(other.scopes);
         }
     }
 
     /// All entries: treatment, feature, count; sorted.
     pub fn entries(&self) -> impl Iterator<Item = (Treatment, &str, u64)> {
-        self.entries.iter().map(|((treatment, feature), &count)| (*treatment, feature.as_str(), count))
+        self.all().map(|(treatment, feature, entry)| (treatment, feature, entry.count))
+    }
+
+    /// The same with what they belong to.
+    pub fn all(&self) -> impl Iterator<Item = (Treatment, &str, &Entry)> {
+        self.entries.iter().map(|((treatment, feature), entry)| (*treatment, feature.as_str(), entry))
     }
 }
 
@@ -72,5 +118,19 @@ mod tests {
         all.merge(ledger(3, "a.obj"));
         assert_eq!(all.entries().collect::<Vec<_>>(), [(Treatment::Ignored, "map_bump", 5)]);
         assert_eq!(all.files().collect::<Vec<_>>(), ["a.obj", "b.obj", "shared.png"].map(Path::new));
+    }
+
+    #[test]
+    fn scopes_move_with_the_lists_that_they_refer_to() {
+        let mut ledger = Ledger::default();
+        ledger.note_in(Treatment::Ignored, "a", Scope::Material(1));
+        ledger.note_in(Treatment::Ignored, "a", Scope::Mesh(0));
+        let mut other = ledger.clone();
+        other.shift(10, 20);
+        ledger.merge(other);
+        let (_, _, entry) = ledger.all().next().unwrap();
+        assert_eq!(entry.count, 4);
+        let expected = [Scope::Material(1), Scope::Material(11), Scope::Mesh(0), Scope::Mesh(20)];
+        assert_eq!(entry.scopes.iter().copied().collect::<Vec<_>>(), expected);
     }
 }

@@ -4,6 +4,7 @@ pub mod atomic_file;
 pub mod gltf;
 pub mod image_file;
 pub mod ledger;
+pub mod limits;
 pub mod model;
 pub mod obj;
 pub mod picture;
@@ -20,7 +21,8 @@ use crate::progress::Progress;
 use crate::scene::auto::{self, Automatic};
 use crate::scene::{Camera, LightKind, Projection, Scene, exposure, origin};
 
-pub use ledger::{Ledger, Treatment};
+pub use ledger::{Ledger, Scope, Treatment};
+pub use limits::Limits;
 pub use model::Model;
 
 /// Which shading normals a mesh gets.
@@ -58,7 +60,7 @@ impl UpAxis {
 }
 
 /// How a file is read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct LoadOptions {
     /// Shading normals of meshes.
     pub normals: NormalMode,
@@ -66,6 +68,21 @@ pub struct LoadOptions {
     pub up: UpAxis,
     /// Whether meshes keep which face of the file each triangle was cut from: 4 bytes a triangle.
     pub faces: bool,
+    /// The angle between faces, in radians, from which on the edge between them is sharp, where an OBJ file has neither normals
+    /// nor smoothing groups; `None` leaves such files flat.
+    pub crease_angle: Option<f64>,
+    /// Which of a glTF file's scenes is read, by name or number; `None` for its default.
+    pub scene: Option<String>,
+    /// Which of a glTF file's animations is applied, by name or number; `None` for the first. Without a time there is none.
+    pub animation: Option<String>,
+    /// The time at which animations are evaluated, in seconds; `None` leaves everything where the file has it.
+    pub time: Option<f64>,
+    /// Whether what the file calls single-sided is not seen from behind.
+    pub cull_back_faces: bool,
+    /// Whether files outside the model's folder are read.
+    pub allow_external: bool,
+    /// How much a file may ask for.
+    pub limits: Limits,
 }
 
 /// A scene and how its files were read.
@@ -105,7 +122,8 @@ pub fn open(path: &Path, options: &LoadOptions, progress: &dyn Progress) -> Resu
     }
     let model = load_model(path, options, progress)?;
     let mut scene = Scene::default();
-    let ledger = model.ledger.clone();
+    let mut ledger = model.ledger.clone();
+    ledger.shift(scene.materials.len() as u32, scene.meshes.len() as u32);
     let physical_lights = model.physical_lights;
     model.append_to(&mut scene);
     scene.origin = origin::choose(&scene);

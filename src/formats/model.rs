@@ -62,9 +62,7 @@ impl Model {
         let first_texture = scene.textures.len() as u32;
         scene.textures.extend(self.textures);
         scene.materials.extend(self.materials.into_iter().map(|mut material| {
-            if let Some(texture) = &mut material.diffuse_texture {
-                texture.texture += first_texture;
-            }
+            material.textures_mut().for_each(|texture| texture.texture += first_texture);
             material
         }));
         scene.meshes.extend(self.meshes.into_iter().map(|mut mesh| {
@@ -133,19 +131,12 @@ impl Contents {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::texture::{Filter, Texels, Wrap};
+    use crate::scene::texture::Texels;
     use crate::scene::{Falloff, Rgb, TextureRef};
 
     #[test]
     fn appended_numbers_are_shifted_together() {
-        let texture = |name: &str| Texture {
-            name: name.into(),
-            width: 1,
-            height: 1,
-            texels: Texels::Srgb8(vec![[0; 4]].into()),
-            wrap: [Wrap::Repeat; 2],
-            filter: Filter::Linear,
-        };
+        let texture = |name: &str| Texture::new(name, 1, 1, Texels::Srgb8(vec![[0; 4]].into()));
         let material = Material { diffuse_texture: Some(TextureRef::new(0)), ..Default::default() };
         let mesh = |materials| TriangleMesh { materials, ..Default::default() };
         let object = |mesh| Object {

@@ -1,6 +1,6 @@
 //! Triangle meshes: shared vertex arrays, and which triangles can be hit at all.
 
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3, Vec4};
 use robust::{Coord, orient2d};
 
 use crate::error::{Error, Result};
@@ -29,6 +29,13 @@ pub struct TriangleMesh {
     pub normals: Option<Vec<Vec3>>,
     /// Texture coordinates per vertex; the origin is the image's lower left corner, v goes up.
     pub uvs: Option<Vec<Vec2>>,
+    /// A second set of texture coordinates, for those textures that use it.
+    pub second_uvs: Option<Vec<Vec2>>,
+    /// Linear colours and alpha per vertex, in fractions of 65535: they multiply a material's diffuse colour.
+    pub colors: Option<Vec<[u16; 4]>>,
+    /// Tangents per vertex, for normal maps: the direction in which u grows, of any length, and in w the sign of
+    /// the bitangent `w cross(normal, tangent)`, along which v grows.
+    pub tangents: Option<Vec<Vec4>>,
     /// Which of the scene's materials each triangle has.
     pub materials: Materials,
     /// The 0-based face of the file that each triangle was cut from, where that was asked for and faces are not
@@ -115,15 +122,17 @@ impl TriangleMesh {
             let name = &self.name;
             Error::caller(format!("mesh `{name}` has {have} {what} for {} positions", self.positions.len()))
         };
-        if let Some(normals) = &self.normals
-            && normals.len() != self.positions.len()
-        {
-            return Err(mismatch("normals", normals.len()));
-        }
-        if let Some(uvs) = &self.uvs
-            && uvs.len() != self.positions.len()
-        {
-            return Err(mismatch("texture coordinates", uvs.len()));
+        let counts = [
+            ("normals", self.normals.as_ref().map(Vec::len)),
+            ("texture coordinates", self.uvs.as_ref().map(Vec::len)),
+            ("second texture coordinates", self.second_uvs.as_ref().map(Vec::len)),
+            ("colours", self.colors.as_ref().map(Vec::len)),
+            ("tangents", self.tangents.as_ref().map(Vec::len)),
+        ];
+        for (what, count) in counts {
+            if let Some(count) = count.filter(|&count| count != self.positions.len()) {
+                return Err(mismatch(what, count));
+            }
         }
         if let Materials::PerTriangle(materials) = &self.materials
             && materials.len() != self.indices.len()
@@ -272,6 +281,9 @@ impl TriangleMesh {
             + std::mem::size_of_val(self.indices.as_slice())
             + self.normals.as_ref().map_or(0, |normals| std::mem::size_of_val(normals.as_slice()))
             + self.uvs.as_ref().map_or(0, |uvs| std::mem::size_of_val(uvs.as_slice()))
+            + self.second_uvs.as_ref().map_or(0, |uvs| std::mem::size_of_val(uvs.as_slice()))
+            + self.colors.as_ref().map_or(0, |colors| std::mem::size_of_val(colors.as_slice()))
+            + self.tangents.as_ref().map_or(0, |tangents| std::mem::size_of_val(tangents.as_slice()))
             + std::mem::size_of_val(self.dropped.as_slice())
             + per_triangle
     }

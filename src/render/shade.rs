@@ -137,7 +137,7 @@ impl<I: Answers> Tracer<'_, I> {
     #[inline(never)]
     fn texel(&self, reference: &TextureRef, point: &SurfacePoint, hit: &Hit) -> Rgb {
         let uv = point.texture_coordinates(self.scene, hit);
-        self.scene.textures[reference.texture as usize].sample(uv * reference.scale + reference.offset)
+        self.scene.textures[reference.texture as usize].sample(reference.place(uv))
     }
 
     /// The mirror ray of a point, counted.

@@ -1,31 +1,46 @@
 //! The terms of the shading formula that belong to a surface.
 
-use glam::DVec2;
+use glam::{DMat2, DVec2, Vec4};
 
 use crate::scene::Rgb;
+use crate::scene::detail::Detail;
 
 /// A texture as a material uses it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TextureRef {
     /// Position in the scene's list of textures.
     pub texture: u32,
-    /// Texture coordinates are multiplied by this...
-    pub scale: DVec2,
-    /// ...and moved by this: `uv * scale + offset`.
+    /// Whether the mesh's second set of texture coordinates is used.
+    pub second_uvs: bool,
+    /// Texture coordinates, whose v goes up, are multiplied by this...
+    pub matrix: DMat2,
+    /// ...and moved by this.
     pub offset: DVec2,
 }
 
 impl TextureRef {
     /// The texture at this position of the scene's list, its coordinates as they are.
     pub fn new(texture: u32) -> Self {
-        Self { texture, scale: DVec2::ONE, offset: DVec2::ZERO }
+        Self::scaled(texture, DVec2::ONE, DVec2::ZERO)
+    }
+
+    /// The same with coordinates `uv * scale + offset`.
+    pub fn scaled(texture: u32, scale: DVec2, offset: DVec2) -> Self {
+        Self { texture, second_uvs: false, matrix: DMat2::from_diagonal(scale), offset }
+    }
+
+    /// Where a point with these texture coordinates is in the image.
+    #[inline(always)]
+    pub fn place(&self, uv: DVec2) -> DVec2 {
+        self.matrix.x_axis * uv.x + self.matrix.y_axis * uv.y + self.offset
     }
 }
 
 /// A Phong material with mirror and transmission:
 /// `I = Oa + sum_i Si Ipi [(1 - kt) Od (N.Li) + ks Os (R.V)^n] + kr Ir + kt It`.
 ///
-/// All colours and weights are linear, per channel.
+/// All colours and weights are linear, per channel. Where there is [`detail`](Self::detail) they are means, and
+/// [`at`](Self::at) gives those of a point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Material {
     /// For messages, overrides and `info`.
@@ -50,38 +65,125 @@ pub struct Material {
     pub kt: Rgb,
     /// Index of refraction inside, relative to outside.
     pub ior: f32,
+    /// What is absorbed inside, per unit of length: over a distance d there remains `exp(-absorption d)` (Beer's law).
+    pub absorption: Rgb,
     /// Shade with the face's normal even where the mesh has smooth ones.
     pub flat: bool,
+    /// Whether the backs of triangles are not there.
+    pub single_sided: bool,
+    /// What else differs from point to point; `None` for most materials, which then cost nothing more.
+    pub detail: Option<Box<Detail>>,
 }
 
 impl Default for Material {
     /// A matt light grey.
     fn default() -> Self {
-        Self {
-            name: "default".into(),
-            ambient: None,
-            emission: Rgb::ZERO,
-            diffuse: Rgb::splat(0.8),
-            diffuse_texture: None,
-            specular: Rgb::ONE,
-            ks: Rgb::ZERO,
-            shininess: 32.0,
-            kr: Rgb::ZERO,
-            kt: Rgb::ZERO,
-            ior: 1.5,
-            flat: false,
-        }
+        Self { name: "default".into(), diffuse: Rgb::splat(0.8), ks: Rgb::ZERO, ..Self::NAMELESS }
     }
 }
 
 impl Material {
-    /// Whether light passes through: then shadow rays are attenuated, not blocked.
+    /// Black, for others to be made from without taking memory.
+    pub(crate) const NAMELESS: Self = Self {
+        name: String::new(),
+        ambient: None,
+        emission: Rgb::ZERO,
+        diffuse: Rgb::ZERO,
+        diffuse_texture: None,
+        specular: Rgb::ONE,
+        ks: Rgb::ZERO,
+        shininess: 32.0,
+        kr: Rgb::ZERO,
+        kt: Rgb::ZERO,
+        ior: 1.5,
+        absorption: Rgb::ZERO,
+        flat: false,
+        single_sided: false,
+        detail: None,
+    };
+
+    /// Whether light passes through.
     pub fn is_transmissive(&self) -> bool {
         self.kt != Rgb::ZERO
+    }
+
+    /// Whether light may pass somewhere: then shadow rays are attenuated, not blocked.
+    pub fn lets_light_through(&self) -> bool {
+        self.is_transmissive() || self.has_holes()
+    }
+
+    /// Whether the surface may not be there at some points.
+    pub fn has_holes(&self) -> bool {
+        self.single_sided || self.detail.as_ref().is_some_and(|detail| detail.alpha.is_some())
     }
 
     /// Whether it mirrors.
     pub fn is_reflective(&self) -> bool {
         self.kr != Rgb::ZERO
+    }
+
+    /// Whether anything is absorbed inside.
+    pub fn is_absorbing(&self) -> bool {
+        self.absorption != Rgb::ZERO
+    }
+
+    /// Every use of a texture.
+    pub fn textures(&self) -> impl Iterator<Item = &TextureRef> {
+        self.diffuse_texture.iter().chain(self.detail.iter().flat_map(|detail| detail.textures()))
+    }
+
+    /// The same, to be changed.
+    pub fn textures_mut(&mut self) -> impl Iterator<Item = &mut TextureRef> {
+        self.diffuse_texture.iter_mut().chain(self.detail.iter_mut().flat_map(|detail| detail.textures_mut()))
+    }
+
+    /// The terms at a point where vertices have a colour and `texel` gives what images have, both with alpha and linear;
+    /// without name, texture and detail.
+    pub fn at(&self, color: Vec4, texel: impl Fn(&TextureRef) -> Vec4) -> Self {
+        let base = self.diffuse_texture.as_ref().map_or(color, |texture| color * texel(texture));
+        let terms = Self {
+            ambient: self.ambient,
+            emission: self.emission,
+            diffuse: self.diffuse * base.truncate(),
+            specular: self.specular,
+            ks: self.ks,
+            shininess: self.shininess,
+            kr: self.kr,
+            kt: self.kt,
+            ior: self.ior,
+            absorption: self.absorption,
+            flat: self.flat,
+            single_sided: self.single_sided,
+            ..Self::NAMELESS
+        };
+        match &self.detail {
+            Some(detail) => detail.apply(terms, base, texel),
+            None => terms,
+        }
+    }
+
+    /// How much of the surface is there at a point, from 0 to 1, given as for [`at`](Self::at): 0 for a hole.
+    pub fn alpha_at(&self, color: Vec4, texel: impl Fn(&TextureRef) -> Vec4) -> f32 {
+        let Some(alpha) = self.detail.as_ref().and_then(|detail| detail.alpha.as_ref()) else { return 1.0 };
+        let base = self.diffuse_texture.as_ref().map_or(1.0, |texture| texel(texture).w);
+        alpha.at(color.w * base, texel)
+    }
+
+    /// The terms of a surface of which only a share is there and hides what lies behind, straight on: alpha blending.
+    pub fn blended(self, alpha: f32) -> Self {
+        let alpha = alpha.clamp(0.0, 1.0);
+        if alpha == 1.0 {
+            return self;
+        }
+        let kr = self.kr * alpha;
+        Self {
+            emission: self.emission * alpha,
+            ambient: self.ambient.map(|ambient| ambient * alpha),
+            ks: self.ks * alpha,
+            kr,
+            kt: (self.kt * alpha + Rgb::splat(1.0 - alpha)).min(Rgb::ONE - kr),
+            ior: 1.0,
+            ..self
+        }
     }
 }

@@ -4,10 +4,10 @@ use std::borrow::Cow;
 use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
-use ::gltf::json::texture::{MagFilter, WrappingMode};
+use ::gltf::json::texture::{MagFilter, MinFilter, WrappingMode};
 use ::gltf::json::validation::Checked;
 use ::gltf::json::{self, Index, Root, texture};
-use glam::{DVec2, Vec4};
+use glam::{DMat2, DVec2, Vec4};
 use rayon::prelude::*;
 
 use super::buffers::Buffers;
@@ -26,18 +26,19 @@ pub(super) struct Textures<'a> {
     images: Vec<Option<Texture>>,
     /// What materials refer to, in order of first use.
     made: Vec<Texture>,
+    /// The mean of each.
+    means: Vec<Vec4>,
     /// From a texture's number in the file to its place in `made`.
-    places: HashMap<usize, u32>,
-    means: HashMap<usize, Mean>,
+    places: HashMap<(usize, Encoding), u32>,
 }
 
-/// The mean of an image.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Mean {
-    /// Of the colours, linear.
-    pub color: Rgb,
-    /// Of the stored values, each from 0 to 1, not decoded: for images that hold numbers. Alpha is 1 without alpha.
-    pub values: Vec4,
+/// What an image's bytes are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) enum Encoding {
+    /// Colours in sRGB.
+    Srgb,
+    /// Numbers.
+    Numbers,
 }
 
 impl<'a> Textures<'a> {
@@ -72,42 +73,36 @@ impl<'a> Textures<'a> {
                 }
             }
         }
-        Self { root, images, made: Vec::new(), places: HashMap::new(), means: HashMap::new() }
+        Self { root, images, made: Vec::new(), means: Vec::new(), places: HashMap::new() }
     }
 
     /// How a material refers to a texture, its transform included; `None` if its image could not be read.
-    pub fn refer(&mut self, info: &texture::Info, ledger: &mut Ledger) -> Option<TextureRef> {
+    pub fn refer(&mut self, info: &texture::Info, encoding: Encoding, ledger: &mut Ledger) -> Option<TextureRef> {
         let number = info.index.value();
-        let place = match self.places.get(&number) {
+        let place = match self.places.get(&(number, encoding)) {
             Some(&place) => place,
             None => {
                 let image = self.images[image_of(self.root, info.index)?].as_ref()?;
                 let place = u32::try_from(self.made.len()).ok()?;
-                self.made.push(sampled(self.root, number, image));
-                self.places.insert(number, place);
+                let texture = sampled(self.root, number, image, encoding);
+                self.means.push(mean(&texture));
+                self.made.push(texture);
+                self.places.insert((number, encoding), place);
                 place
             }
         };
         Some(transformed(place, info, ledger))
     }
 
-    /// The mean of a texture's image; `None` if it could not be read.
-    pub fn mean(&mut self, texture: Index<json::Texture>) -> Option<Mean> {
-        let number = image_of(self.root, texture)?;
-        let image = self.images[number].as_ref()?;
-        Some(*self.means.entry(number).or_insert_with(|| mean(image)))
+    /// The mean of what a texture has, linear.
+    pub fn mean(&self, texture: &TextureRef) -> Vec4 {
+        self.means[texture.texture as usize]
     }
 
     /// The textures that materials refer to.
     pub fn into_textures(self) -> Vec<Texture> {
         self.made
     }
-}
-
-/// The texture coordinate set that a texture reads.
-pub(super) fn uv_set(info: &texture::Info) -> u32 {
-    let transform = info.extensions.as_ref().and_then(|extensions| extensions.texture_transform.as_ref());
-    transform.and_then(|transform| transform.tex_coord).unwrap_or(info.tex_coord)
 }
 
 /// The image of a texture: its own, or the WebP that EXT_texture_webp names instead.
@@ -161,8 +156,8 @@ fn image_name(root: &Root, number: usize) -> String {
     root.images[number].name.clone().unwrap_or_else(|| format!("image {number}"))
 }
 
-/// The image as a texture's sampler reads it. There are no smaller levels here, so that `minFilter` plays no part.
-fn sampled(root: &Root, texture: usize, image: &Texture) -> Texture {
+/// The image as a texture's sampler reads it.
+fn sampled(root: &Root, texture: usize, image: &Texture, encoding: Encoding) -> Texture {
     let sampler = root.textures[texture].sampler.and_then(|sampler| root.samplers.get(sampler.value()));
     let wrap = |mode: Option<Checked<WrappingMode>>| match mode {
         Some(Checked::Valid(WrappingMode::ClampToEdge)) => Wrap::Clamp,
@@ -173,49 +168,60 @@ fn sampled(root: &Root, texture: usize, image: &Texture) -> Texture {
         Some(Checked::Valid(MagFilter::Nearest)) => Filter::Nearest,
         _ => Filter::Linear,
     };
+    let has_levels = !matches!(
+        sampler.and_then(|sampler| sampler.min_filter),
+        Some(Checked::Valid(MinFilter::Nearest | MinFilter::Linear))
+    );
     let wrap = [wrap(sampler.map(|sampler| sampler.wrap_s)), wrap(sampler.map(|sampler| sampler.wrap_t))];
-    Texture { wrap, filter, ..image.clone() }
+    let texels = match (&image.texels, encoding) {
+        (Texels::Srgb8(texels), Encoding::Numbers) => Texels::Data8(texels.clone()),
+        (texels, _) => texels.clone(),
+    };
+    let texture = Texture { wrap, filter, texels, ..image.clone() };
+    if has_levels { texture.with_levels() } else { texture }
 }
 
-/// KHR_texture_transform for coordinates whose v goes up: `v' = s v + o` with v down is `s v + (1 - s - o)` with v up.
+/// KHR_texture_transform, which is for coordinates whose v goes down, for those whose v goes up: with `F (u, v) = (u, 1 - v)`
+/// it is `F T F`.
 fn transformed(place: u32, info: &texture::Info, ledger: &mut Ledger) -> TextureRef {
     let transform = info.extensions.as_ref().and_then(|extensions| extensions.texture_transform.as_ref());
-    let Some(transform) = transform else { return TextureRef::new(place) };
-    if transform.rotation.0 != 0.0 {
-        ledger.note(Treatment::Approximated, "KHR_texture_transform: rotation left out", 1);
+    let set = transform.and_then(|transform| transform.tex_coord).unwrap_or(info.tex_coord);
+    if set > 1 {
+        ledger.note(Treatment::Approximated, "texture coordinates beyond TEXCOORD_1: that is used", 1);
     }
-    let scale = DVec2::from(transform.scale.0.map(f64::from));
-    let offset = DVec2::from(transform.offset.0.map(f64::from));
-    TextureRef { texture: place, scale, offset: DVec2::new(offset.x, 1.0 - scale.y - offset.y) }
+    let own = TextureRef { second_uvs: set > 0, ..TextureRef::new(place) };
+    let Some(transform) = transform else { return own };
+    let (sin, cos) = libm::sincos(f64::from(transform.rotation.0));
+    let [sx, sy] = transform.scale.0.map(f64::from);
+    let [x, y] = transform.offset.0.map(f64::from);
+    // Translation, rotation counter-clockwise as seen with v down, scale.
+    let (a, b, c, d) = (cos * sx, sin * sy, -sin * sx, cos * sy);
+    let matrix = DMat2::from_cols(DVec2::new(a, -c), DVec2::new(-b, d));
+    TextureRef { matrix, offset: DVec2::new(b + x, 1.0 - d - y), ..own }
 }
 
-fn mean(image: &Texture) -> Mean {
-    match &image.texels {
-        Texels::Srgb8(texels) => {
-            // Counting the 256 values of each channel makes the sum exact and the curve cheap.
-            let mut counts = [[0u64; 256]; 4];
-            for texel in texels.iter() {
-                for (channel, &byte) in counts.iter_mut().zip(texel) {
-                    channel[usize::from(byte)] += 1;
-                }
-            }
-            let average = |channel: usize, value: fn(f64) -> f64| -> f32 {
-                let sum: f64 = (0u8..=255)
-                    .map(|byte| counts[channel][usize::from(byte)] as f64 * value(f64::from(byte) / 255.0))
-                    .sum();
-                (sum / texels.len() as f64) as f32
-            };
-            Mean {
-                color: Rgb::from_array(std::array::from_fn(|channel| average(channel, srgb_to_linear))),
-                values: Vec4::from_array(std::array::from_fn(|channel| average(channel, |value| value))),
-            }
-        }
+fn mean(image: &Texture) -> Vec4 {
+    let (bytes, curve): (_, fn(f64) -> f64) = match &image.texels {
+        Texels::Srgb8(texels) => (texels, srgb_to_linear),
+        Texels::Data8(texels) => (texels, |value| value),
         Texels::Linear32(texels) => {
             let sum = texels.iter().fold([0.0f64; 3], |sum, texel| {
                 std::array::from_fn(|channel| sum[channel] + f64::from(texel[channel]))
             });
-            let color = Rgb::from_array(sum.map(|sum| (sum / texels.len() as f64) as f32));
-            Mean { color, values: color.extend(1.0) }
+            return Rgb::from_array(sum.map(|sum| (sum / texels.len() as f64) as f32)).extend(1.0);
+        }
+    };
+    // Counting the 256 values of each channel makes the sum exact and the curve cheap.
+    let mut counts = [[0u64; 256]; 4];
+    for texel in bytes.iter() {
+        for (channel, &byte) in counts.iter_mut().zip(texel) {
+            channel[usize::from(byte)] += 1;
         }
     }
+    Vec4::from_array(std::array::from_fn(|channel| {
+        let curve = if channel == 3 { |value| value } else { curve };
+        let sum: f64 =
+            (0u8..=255).map(|byte| counts[channel][usize::from(byte)] as f64 * curve(f64::from(byte) / 255.0)).sum();
+        (sum / bytes.len() as f64) as f32
+    }))
 }

@@ -15,13 +15,14 @@ use crate::formats::{Ledger, NormalMode, Treatment, rounding};
 use crate::geometry::TriangleMesh;
 use crate::geometry::mesh::{Materials, Rounding};
 use crate::math::origin::choose_origin;
+use crate::scene::Material;
 
 /// What all meshes of a file are read with.
 pub(super) struct MeshReader<'a> {
     pub root: &'a Root,
     pub buffers: &'a Buffers<'a>,
-    /// The texture coordinate set that each material's base colour uses.
-    pub uv_sets: &'a [u32],
+    /// All materials of the file, that of primitives without one among them.
+    pub materials: &'a [Material],
     /// The material of primitives that have none.
     pub default_material: u32,
     pub normals: NormalMode,
@@ -35,7 +36,7 @@ const NO_VERTEX: u32 = u32::MAX;
 struct Builder {
     positions: Vec<Vec3>,
     normals: Vec<Vec3>,
-    uvs: Vec<Vec2>,
+    uvs: [Vec<Vec2>; 2],
     indices: Vec<[u32; 3]>,
     /// Materials and up to which triangle each reaches.
     materials: Vec<(u32, usize)>,
@@ -134,14 +135,18 @@ impl MeshReader<'_> {
             builder.normals.resize(first, Vec3::ZERO);
             builder.normals.append(&mut normals.vectors::<3, Vec3>(selection)?);
         }
-        let uv_set = primitive.material.and_then(|material| self.uv_sets.get(material.value())).copied().unwrap_or(0);
-        if let Some(uvs) = shading("TEXCOORD", Semantic::TexCoords(uv_set))? {
-            builder.uvs.resize(first, Vec2::ZERO);
-            // v goes down from the top of the image in the file, and up from its bottom here.
-            let uvs = uvs.vectors::<2, Vec2>(selection)?;
-            builder.uvs.extend(uvs.into_iter().map(|uv| Vec2::new(uv.x, 1.0 - uv.y)));
-        }
         let material = primitive.material.map_or(self.default_material, |material| material.value() as u32);
+        for set in 0..2 {
+            // The first set is kept for what may be wanted of it later, the second where it is used.
+            let is_used = set == 0 || self.materials[material as usize].textures().any(|texture| texture.second_uvs);
+            let uvs = if is_used { shading("TEXCOORD", Semantic::TexCoords(set))? } else { None };
+            if let Some(uvs) = uvs {
+                let own = &mut builder.uvs[set as usize];
+                own.resize(first, Vec2::ZERO);
+                // v goes down from the top of the image in the file, and up from its bottom here.
+                own.extend(uvs.vectors::<2, Vec2>(selection)?.into_iter().map(|uv| Vec2::new(uv.x, 1.0 - uv.y)));
+            }
+        }
         builder.materials.push((material, builder.indices.len()));
         Ok(())
     }
@@ -180,9 +185,11 @@ impl Builder {
             self.normals.resize(vertices, Vec3::ZERO);
             self.normals
         });
-        let uvs = (!self.uvs.is_empty()).then(|| {
-            self.uvs.resize(vertices, Vec2::ZERO);
-            self.uvs
+        let [uvs, second_uvs] = self.uvs.map(|mut uvs| {
+            (!uvs.is_empty()).then(|| {
+                uvs.resize(vertices, Vec2::ZERO);
+                uvs
+            })
         });
         let (mut positions, indices) = (self.positions, self.indices);
         let rounding = Rounding { largest_loss: 0.0, finest_edge: finest_edge(&positions, &indices) };
@@ -191,9 +198,19 @@ impl Builder {
         if origin != DVec3::ZERO {
             positions.iter_mut().for_each(|p| *p = (p.as_dvec3() - origin).as_vec3());
         }
-        let mut mesh =
-            TriangleMesh { name, origin, positions, indices, normals, uvs, materials, rounding, ..Default::default() }
-                .finish()?;
+        let mut mesh = TriangleMesh {
+            name,
+            origin,
+            positions,
+            indices,
+            normals,
+            uvs,
+            second_uvs,
+            materials,
+            rounding,
+            ..Default::default()
+        }
+        .finish()?;
         if mode == NormalMode::Smooth {
             mesh.compute_normals();
         }

@@ -21,7 +21,6 @@ mod lights;
 mod material;
 mod mesh;
 mod nodes;
-mod phong;
 mod topology;
 mod uri;
 
@@ -34,6 +33,7 @@ use ::gltf::json::Root;
 
 use crate::error::{Error, Result};
 use crate::formats::{Ledger, LoadOptions, Model, Treatment};
+use crate::geometry::TriangleMesh;
 use crate::math::Transform;
 use crate::math::transform::compose;
 use crate::progress::Progress;
@@ -44,6 +44,7 @@ use cameras::Cameras;
 use container::Container;
 use document::Document;
 use images::Textures;
+use material::MaterialReader;
 use mesh::MeshReader;
 use nodes::PlacedNode;
 
@@ -79,25 +80,31 @@ fn read(file: &[u8], folder: &Path, options: &LoadOptions, progress: &dyn Progre
     let wanted = root.materials.iter().flat_map(material::textures_of);
     let mut textures = Textures::decode(root, &buffers, folder, wanted, &mut ledger);
     progress.check()?;
+    let mut materials = MaterialReader {
+        textures: &mut textures,
+        ledger: &mut ledger,
+        colored: &material::colored(root),
+        cull_back_faces: options.cull_back_faces,
+    };
     for (number, source) in root.materials.iter().enumerate() {
-        model.materials.push(material::read(number, source, &mut textures, &mut ledger));
+        model.materials.push(materials.read(number, source));
     }
     if needs_default_material(root) {
         let source = ::gltf::json::Material { name: Some("default".into()), ..Default::default() };
-        model.materials.push(material::read(root.materials.len(), &source, &mut textures, &mut ledger));
+        model.materials.push(materials.read(root.materials.len(), &source));
     }
     model.textures = textures.into_textures();
 
     let mut budget = Budget::new(file.len() as u64 + buffers.total_bytes());
-    let uv_sets: Vec<u32> = root.materials.iter().map(material::base_uv_set).collect();
     let reader = MeshReader {
         root,
         buffers: &buffers,
-        uv_sets: &uv_sets,
+        materials: &model.materials,
         default_material: root.materials.len() as u32,
         normals: options.normals,
     };
-    let places = read_meshes(&reader, &placed, &mut model, &mut budget, &mut ledger, progress)?;
+    let (meshes, places) = read_meshes(&reader, &placed, &mut budget, &mut ledger, progress)?;
+    model.meshes = meshes;
     let mut cameras = Cameras::default();
     for node in &placed {
         place_objects(root, &buffers, node, &places, &mut model, &mut budget, &mut ledger)?;
@@ -116,28 +123,28 @@ fn needs_default_material(root: &Root) -> bool {
     root.materials.is_empty() || primitives.any(|primitive| primitive.material.is_none())
 }
 
-/// Reads the meshes that placed nodes show, in file order. By mesh number, their places in the model; `None` for
+/// Reads the meshes that placed nodes show, in file order; and by mesh number their places among these, `None` for
 /// meshes that are not shown or have no triangles.
 fn read_meshes(
     reader: &MeshReader,
     placed: &[PlacedNode],
-    model: &mut Model,
     budget: &mut Budget,
     ledger: &mut Ledger,
     progress: &dyn Progress,
-) -> Result<Vec<Option<u32>>> {
+) -> Result<(Vec<TriangleMesh>, Vec<Option<u32>>)> {
     let mut is_shown = vec![false; reader.root.meshes.len()];
     for mesh in placed.iter().filter_map(|node| node.node.mesh) {
         is_shown[mesh.value()] = true;
     }
     progress.begin("load", is_shown.iter().filter(|&&shown| shown).count() as u64);
+    let mut meshes = Vec::new();
     let mut places = vec![None; is_shown.len()];
     for number in (0..is_shown.len()).filter(|&number| is_shown[number]) {
         progress.check()?;
         let mesh = reader.read(number, budget, ledger)?;
         if mesh.triangle_count() > 0 {
-            places[number] = u32::try_from(model.meshes.len()).ok();
-            model.meshes.push(mesh);
+            places[number] = u32::try_from(meshes.len()).ok();
+            meshes.push(mesh);
         }
         progress.advance(1);
     }
@@ -145,7 +152,7 @@ fn read_meshes(
     if unused > 0 {
         ledger.note(Treatment::Ignored, "mesh that no node of the scene shows", unused);
     }
-    Ok(places)
+    Ok((meshes, places))
 }
 
 /// Adds the objects of a node: one, or one an instance.

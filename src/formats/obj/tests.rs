@@ -224,7 +224,7 @@ fn textures_belong_to_the_library_s_folder() {
     assert_eq!(warnings(&model), [""; 0]);
     assert_eq!(model.textures.len(), 1);
     let used = model.materials[0].diffuse_texture.unwrap();
-    assert_eq!((used.texture, used.scale), (0, glam::DVec2::splat(2.0)));
+    assert_eq!(used, crate::scene::TextureRef::scaled(0, glam::DVec2::splat(2.0), glam::DVec2::ZERO));
     assert_eq!(model.materials[1].diffuse_texture.unwrap().texture, 0);
     assert_eq!(model.textures[0].sample(glam::DVec2::ZERO), Vec3::X);
 }

@@ -39,7 +39,7 @@ impl Textures {
                 texture
             }
         }?;
-        Some(TextureRef { texture, scale: map.scale, offset: map.offset })
+        Some(TextureRef::scaled(texture, map.scale, map.offset))
     }
 
     /// All textures, in the order of their first use.

@@ -120,5 +120,5 @@ fn read_texture(value: &Value<'_>, reader: &mut Reader<'_>) -> Result<Option<Tex
     texture.filter = fields.or("filter", texture.filter, |value| value.choice(&filters))?;
     let scale = fields.or("scale", DVec2::ONE, Value::pair)?;
     let offset = fields.or("offset", DVec2::ZERO, Value::pair)?;
-    Ok(Some(TextureRef { texture: reader.add_texture(texture), scale, offset }))
+    Ok(Some(TextureRef::scaled(reader.add_texture(texture), scale, offset)))
 }

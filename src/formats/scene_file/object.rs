@@ -81,7 +81,7 @@ fn read_load_options(fields: &Fields<'_>, default: &LoadOptions) -> Result<LoadO
     Ok(LoadOptions {
         normals: fields.or("normals", default.normals, |value: &Value<'_>| value.choice(&modes))?,
         up: fields.or("up", default.up, |value| value.choice(&axes))?,
-        faces: default.faces,
+        ..default.clone()
     })
 }
 

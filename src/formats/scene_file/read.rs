@@ -57,7 +57,7 @@ pub(super) fn parse(text: &str, path: &Path, options: &LoadOptions, progress: &d
         ledger: Ledger::default(),
         names: HashMap::new(),
         images: HashMap::new(),
-        models: HashMap::new(),
+        models: Vec::new(),
         imported: Contents::default(),
         extents: Extents::default(),
     };
@@ -77,7 +77,7 @@ pub struct Reader<'a> {
     names: HashMap<(&'static str, String), u32>,
     /// By the path that [`identity`] gives.
     images: HashMap<PathBuf, Texture>,
-    models: HashMap<(PathBuf, LoadOptions), Contents>,
+    models: Vec<((PathBuf, LoadOptions), Contents)>,
     /// Cameras and lights of models, placed.
     imported: Contents,
     /// Of the scene as far as it is read.
@@ -243,8 +243,8 @@ impl Reader<'_> {
     /// first time.
     pub fn model(&mut self, value: &Value<'_>, options: &LoadOptions) -> Result<Contents> {
         let path = self.file(value)?;
-        let key = (identity(&path), *options);
-        if let Some(contents) = self.models.get(&key) {
+        let key = (identity(&path), options.clone());
+        if let Some((_, contents)) = self.models.iter().find(|(known, _)| *known == key) {
             return Ok(contents.clone());
         }
         let model = load_model(&path, options, self.progress).map_err(|error| match error.fault() {
@@ -252,10 +252,12 @@ impl Reader<'_> {
             Fault::Unsupported if error.line().is_none() => value.error(error.to_string()),
             _ => error,
         })?;
-        self.ledger.merge(model.ledger.clone());
+        let mut ledger = model.ledger.clone();
+        ledger.shift(self.scene.materials.len() as u32, self.scene.meshes.len() as u32);
+        self.ledger.merge(ledger);
         let contents = model.append_assets(&mut self.scene);
         self.extents.add_new(&self.scene);
-        self.models.insert(key, contents.clone());
+        self.models.push((key, contents.clone()));
         Ok(contents)
     }
 

@@ -376,7 +376,10 @@ fn meshes_are_shared_replaced_and_overridden() {
     let mine = scene.materials[1].diffuse_texture.unwrap();
     let texture = &scene.textures[mine.texture as usize];
     assert_eq!((texture.wrap, texture.filter), ([Wrap::Clamp, Wrap::Repeat], Filter::Nearest));
-    assert_eq!((mine.scale, mine.offset), (glam::DVec2::splat(2.0), glam::DVec2::new(0.5, 0.0)));
+    assert_eq!(
+        mine,
+        crate::scene::TextureRef::scaled(mine.texture, glam::DVec2::splat(2.0), glam::DVec2::new(0.5, 0.0))
+    );
 
     let reds: Vec<_> = scene.materials.iter().filter(|material| material.name == "red").collect();
     assert_eq!(reds.len(), 2, "one for each way of reading the file");

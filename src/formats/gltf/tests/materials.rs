@@ -1,12 +1,12 @@
 //! Materials, textures and images.
 
-use glam::{DVec2, Vec2};
+use glam::{DVec2, Vec2, Vec4};
 use serde_json::json;
 
 use super::super::uri::{Target, resolve};
 use super::*;
-use crate::scene::Rgb;
-use crate::scene::texture::{Filter, Wrap};
+use crate::scene::texture::{Filter, Texels, Wrap};
+use crate::scene::{Rgb, TextureRef};
 
 /// A PNG of 2 x 1 texels: pure red and black.
 const RED_BLACK: &str = "data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAIAAAABCAIAAAB7QOjdAA\
@@ -41,9 +41,9 @@ fn textures_are_decoded_once_and_read_as_their_samplers_say() {
 
     // The texel that glTF reads at (u, v) is the one that we read at our coordinates.
     let mesh = &model.meshes[0];
-    assert_eq!(mesh.uvs.as_deref().unwrap()[2], Vec2::new(0.0, 0.75));
+    assert_eq!(mesh.second_uvs.as_deref().unwrap()[2], Vec2::new(0.0, 0.75));
     let reference = model.materials[0].diffuse_texture.unwrap();
-    let ours = mesh.uvs.as_deref().unwrap()[2].as_dvec2() * reference.scale + reference.offset;
+    let ours = reference.place(mesh.second_uvs.as_deref().unwrap()[2].as_dvec2());
     let theirs = DVec2::new(0.0, 0.25) * DVec2::new(2.0, 3.0) + DVec2::new(0.5, 0.25);
     assert_eq!(ours, DVec2::new(theirs.x, 1.0 - theirs.y));
 }
@@ -68,7 +68,7 @@ fn images_may_lie_in_a_buffer() {
 }
 
 #[test]
-fn data_textures_act_by_their_mean() {
+fn images_of_numbers_and_of_light_are_read_texel_by_texel() {
     let mut file = File::default();
     let position = file.triangle();
     let mut rest = one(json!({"attributes": {"POSITION": position}, "material": 0}));
@@ -80,7 +80,17 @@ fn data_textures_act_by_their_mean() {
     let material = &model.materials[0];
     // Green and blue are 0: perfectly smooth and no metal.
     assert!((material.kr - 0.04).abs().max_element() < 1e-6 && material.diffuse == Rgb::ONE);
-    assert_eq!(material.emission, Rgb::X * 0.5);
+    let at = |u: f64| {
+        let texel = |used: &TextureRef| {
+            model.textures[used.texture as usize].sample_footprint(used.place(DVec2::new(u, 0.5)), 0.0)
+        };
+        material.at(Vec4::ONE, texel)
+    };
+    assert_eq!((at(0.25).emission, at(0.75).emission), (Rgb::X, Rgb::ZERO));
+    assert!((at(0.25).kr - 0.04).abs().max_element() < 1e-6);
+    assert!(
+        matches!(model.textures[0].texels, Texels::Data8(_)) && matches!(model.textures[1].texels, Texels::Srgb8(_))
+    );
 }
 
 #[test]
@@ -117,11 +127,11 @@ fn material_extensions_become_phong_terms() {
         with_material(json!({"alphaMode": "BLEND", "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.25]}}));
     assert_eq!((blend.materials[0].kt, blend.materials[0].ior), (Rgb::splat(0.75), 1.0));
     assert!(has_note(&blend, Treatment::Honoured, "BLEND"));
-    assert!(has_note(&with_material(json!({"alphaMode": "MASK"})), Treatment::Ignored, "MASK"));
+    assert!(has_note(&with_material(json!({"alphaMode": "MASK"})), Treatment::Honoured, "MASK"));
 }
 
 #[test]
-fn a_blend_takes_the_mean_alpha_of_its_texture() {
+fn a_blend_takes_the_alpha_of_each_texel() {
     // 2 x 1 texels whose alphas are 255 and 0.
     let half = "data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAIAAAABCAYAAAD0In+KAA\
         AADElEQVR4nGP4DwEMACLmBvoI+gInAAAAAElFTkSuQmCC";
@@ -133,6 +143,8 @@ fn a_blend_takes_the_mean_alpha_of_its_texture() {
     rest["materials"] = json!([{"alphaMode": "BLEND",
         "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.5], "baseColorTexture": {"index": 0}}}]);
     let model = file.load(rest).unwrap();
-    assert_eq!(model.materials[0].kt, Rgb::splat(0.75));
-    assert!(has_note(&model, Treatment::Approximated, "BLEND"));
+    let with = |alpha: f32| move |_: &TextureRef| Vec4::new(1.0, 1.0, 1.0, alpha);
+    assert_eq!(model.materials[0].at(Vec4::ONE, with(0.5)).kt, Rgb::splat(0.75));
+    assert_eq!(model.materials[0].alpha_at(Vec4::ONE, with(0.0)), 0.0);
+    assert!(has_note(&model, Treatment::Honoured, "BLEND"));
 }

@@ -4,21 +4,19 @@ use crate::scene::{Material, Rgb};
 
 /// What a glTF material says about a surface, metallic-roughness or specular-glossiness alike.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Surface {
-    /// Colour of light that enters the surface and comes back; multiplied by the base texture where there is one.
+pub struct Surface {
+    /// Colour of light that enters the surface and comes back; with its texture.
     pub matt: Rgb,
-    /// Colour of light that bounces off microfacets too steep to mirror; multiplied by the base texture too.
+    /// Colour of light that bounces off microfacets too steep to mirror; with the base texture too.
     pub metal: Rgb,
-    /// Reflectance at normal incidence, textures averaged.
+    /// Reflectance at normal incidence.
     pub f0: Rgb,
     /// glTF's roughness, from 0 to 1; GGX's alpha is its square.
     pub roughness: f32,
     /// Share of the light that enters the surface and goes on through it.
     pub transmission: f32,
-    /// Colour of light that goes through, textures averaged.
+    /// Colour of light that goes through.
     pub tint: Rgb,
-    /// Share of the surface that is there at all: below 1 where it is blended with what lies behind.
-    pub alpha: f32,
 }
 
 /// A mirror weaker than this in every channel is left out: half of what glass reflects. It keeps rough dielectrics,
@@ -29,7 +27,7 @@ const WEAKEST_MIRROR: f32 = 0.02;
 const SHARPEST: f32 = 10_000.0;
 
 impl Surface {
-    /// The terms of the shading formula; name, emission, texture and index of refraction are the caller's.
+    /// The terms of the shading formula; all else is the caller's.
     ///
     /// - **Diffuse**: `matt (1 - transmission) + metal (1 - fade)`, where `fade = (1 - roughness)^2` is what the surface
     ///   still mirrors. A rough metal reflects its whole surroundings, which neither a highlight nor one mirror ray can
@@ -39,11 +37,10 @@ impl Surface {
     ///   Refraction"), `2 / alpha^2 - 2`, over 4: theirs is for the half vector, whose angle is half of that between
     ///   the reflected ray and the viewer (Fisher and Woo 1994, "R.E versus N.H specular highlights").
     /// - **Mirror**: `kr = F0 fade`, left out below a threshold. **Transmission**: `kt = transmission tint (1 - F0)`,
-    ///   at most `1 - kr`. **Blending** multiplies all of it by `alpha` and adds `1 - alpha` of what lies behind to `kt`.
+    ///   at most `1 - kr`.
     pub fn phong(&self) -> Material {
         let roughness = self.roughness.clamp(0.0, 1.0);
         let f0 = self.f0.clamp(Rgb::ZERO, Rgb::ONE);
-        let alpha = self.alpha.clamp(0.0, 1.0);
         let fade = (1.0 - roughness) * (1.0 - roughness);
         let width = roughness * roughness;
 
@@ -51,23 +48,23 @@ impl Surface {
         let height = if strongest > 0.0 { (strongest / (4.0 * width * width)).min(1.0) } else { 0.0 };
         let exponent = (0.5 * (1.0 / (width * width) - 1.0)).clamp(1.0, SHARPEST);
 
-        let mirror = f0 * fade * alpha;
+        let mirror = f0 * fade;
         let kr = if mirror.max_element() < WEAKEST_MIRROR { Rgb::ZERO } else { mirror };
         let through = (self.tint * self.transmission * (Rgb::ONE - f0)).clamp(Rgb::ZERO, Rgb::ONE - kr);
         let diffuse = self.matt * (1.0 - self.transmission) + self.metal * (1.0 - fade);
 
-        // The shading formula weakens the diffuse term by 1 - kt. For transmission that is undone, since the diffuse
-        // colour already is what remains; for blending it is meant.
+        // The shading formula weakens the diffuse term by 1 - kt. That is undone, since the diffuse colour already is
+        // what remains.
         let undone = Rgb::ONE - through;
         let scaled = |colour: f32, undone: f32| if undone > 0.0 { (colour / undone).min(1.0) } else { 0.0 };
         let diffuse = Rgb::new(scaled(diffuse.x, undone.x), scaled(diffuse.y, undone.y), scaled(diffuse.z, undone.z));
         Material {
             diffuse,
             specular: if strongest > 0.0 { f0 / strongest } else { Rgb::ONE },
-            ks: Rgb::splat(height * alpha),
+            ks: Rgb::splat(height),
             shininess: exponent,
             kr,
-            kt: (through * alpha + Rgb::splat(1.0 - alpha)).min(Rgb::ONE - kr),
+            kt: through,
             ..Material::default()
         }
     }
@@ -84,7 +81,6 @@ mod tests {
         roughness: 1.0,
         transmission: 0.0,
         tint: Rgb::ONE,
-        alpha: 1.0,
     };
 
     #[test]
@@ -115,10 +111,10 @@ mod tests {
         let steps = [0.0, 0.25, 0.5, 0.75, 1.0f32];
         for roughness in steps {
             for transmission in steps {
-                for alpha in steps {
-                    for f0 in steps {
+                for f0 in steps {
+                    for alpha in steps {
                         let f0 = Rgb::new(f0, 0.04, 1.0);
-                        let m = Surface { roughness, transmission, alpha, f0, ..PLASTIC }.phong();
+                        let m = Surface { roughness, transmission, f0, ..PLASTIC }.phong().blended(alpha);
                         assert!((m.kr + m.kt).max_element() <= 1.0, "{m:?}");
                         assert!(m.kt.min_element() >= 0.0 && m.diffuse.max_element() <= 1.0, "{m:?}");
                         assert!(m.ks.max_element() <= 1.0 && m.shininess >= 1.0 && m.diffuse.is_finite(), "{m:?}");
@@ -132,7 +128,7 @@ mod tests {
     fn what_the_formula_takes_from_the_diffuse_term_is_what_goes_through() {
         let half = Surface { transmission: 0.5, f0: Rgb::ZERO, ..PLASTIC }.phong();
         assert!(((Rgb::ONE - half.kt) * half.diffuse - 0.5 * PLASTIC.matt).abs().max_element() < 1e-6);
-        let blended = Surface { alpha: 0.25, ..PLASTIC }.phong();
+        let blended = PLASTIC.phong().blended(0.25);
         assert_eq!(blended.kt, Rgb::splat(0.75));
         assert!(((Rgb::ONE - blended.kt) * blended.diffuse - 0.25 * PLASTIC.matt).abs().max_element() < 1e-6);
     }
