@@ -10,7 +10,7 @@ use whitted::formats::picture;
 use whitted::geometry::{TriangleMesh, shapes};
 use whitted::progress::Silent;
 use whitted::render::{RenderSettings, Renderer};
-use whitted::scene::texture::{Filter, Texels, Wrap};
+use whitted::scene::texture::{Filter, Texels};
 use whitted::scene::{
     Background, Camera, Falloff, FilmSettings, Light, LightKind, Material, NamedCamera, Object, Projection, Rgb, Scene,
     Shape, Texture, TextureRef,
@@ -30,7 +30,7 @@ fn triangle() -> whitted::Result<TriangleMesh> {
 }
 
 fn scene() -> whitted::Result<Scene> {
-    let tiles = TextureRef { scale: DVec2::splat(8.0), ..TextureRef::new(0) };
+    let tiles = TextureRef::scaled(0, DVec2::splat(8.0), DVec2::ZERO);
     let material = |name: &str, diffuse: Rgb, kr: f32| {
         let (ks, kr) = (Rgb::splat(0.4), Rgb::splat(kr));
         Material { name: name.into(), diffuse, ks, shininess: 60.0, kr, ..Material::default() }

@@ -167,6 +167,12 @@ impl Answers for Reference<'_> {
         Hit::MISS
     }
 
+    fn next_hit(&self, ray: &WideRay, after: Key) -> Hit {
+        let all = self.oracle.all_among(ray, &|_| true).into_iter().map(|exact| exact.hit());
+        let mut rest = all.skip_while(|hit| (hit.instance, hit.primitive) != (after.instance, after.primitive)).skip(1);
+        rest.next().unwrap_or(Hit::MISS)
+    }
+
     fn is_blocked_by_opaque(&self, ray: &WideRay) -> bool {
         self.oracle.occluded_by(ray, &|instance| self.world.instances[instance as usize].opaque)
     }

@@ -88,6 +88,9 @@ pub trait Answers: Sync {
     /// in its place and gives a miss.
     fn next_until(&self, ray: &Self::Ray, after: Key, t_max: f32) -> Hit;
 
+    /// The first hit after another.
+    fn next_hit(&self, ray: &Self::Ray, after: Key) -> Hit;
+
     /// Whether anything is hit that is known to be opaque as a whole.
     fn is_blocked_by_opaque(&self, ray: &Self::Ray) -> bool;
 
@@ -154,6 +157,10 @@ impl<I: Intersect> Answers for I {
     #[inline(always)]
     fn first_hit(&self, ray: &Ray) -> Hit {
         self.closest(ray)
+    }
+
+    fn next_hit(&self, ray: &Ray, after: Key) -> Hit {
+        self.next_after(ray, after)
     }
 
     fn next_until(&self, ray: &Ray, after: Key, t_max: f32) -> Hit {

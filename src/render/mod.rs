@@ -10,6 +10,7 @@
 
 pub mod answers;
 mod chunk;
+mod detail;
 pub mod film;
 pub mod intersect;
 mod points;

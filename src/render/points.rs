@@ -135,6 +135,12 @@ impl Points {
         {
             self.shade_smoothly(level, scene, instance, mesh, normals, found, &mut given, &mut odd);
         }
+        if instance.has_normal_maps {
+            let has_map = |material: u32| scene.materials[material as usize].detail.as_ref()?.normal.as_ref();
+            for at in 0..found.count {
+                odd[at] |= u32::from(has_map(self.materials[at]).is_some());
+            }
+        }
         self.solve_odd(scene, world, views, found, &odd);
     }
 
@@ -168,7 +174,7 @@ impl Points {
         }
     }
 
-    /// Those one by one that loops leave, since lengths are extreme.
+    /// Those one by one that loops leave, since lengths are extreme or normals are mapped.
     fn solve_odd(&mut self, scene: &Scene, world: &World, views: &[ViewRay], found: &Found, odd: &Flags) {
         for at in (0..found.count).filter(|&at| odd[at] != 0) {
             let view = &views[found.rays[at] as usize];

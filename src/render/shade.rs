@@ -6,8 +6,9 @@ use glam::DVec3;
 use crate::geometry::Hit;
 use crate::math::lanes::{Flags, LANES, Vectors, whole_rows};
 use crate::math::simd::{Level, Task};
-use crate::math::vector::{dot, is_safe, normalize};
+use crate::math::vector::{dot, is_safe, length, normalize};
 use crate::render::answers::{Answers, Meeting};
+use crate::render::detail::ImagePlace;
 use crate::render::points::Points;
 use crate::render::shadow::{Illumination, PreparedLight};
 use crate::render::surface::SurfacePoint;
@@ -42,8 +43,8 @@ impl<I: Answers> Tracer<'_, I> {
 
     /// [`shade`](Self::shade) with the point that was found.
     pub(super) fn shade_point(&self, view: &ViewRay, hit: &Hit, point: &SurfacePoint, depth: u32) -> Rgb {
-        let material = &self.scene.materials[point.material as usize];
-        let colors = self.colors(point, hit);
+        let material = &*self.terms(point, hit);
+        let colors = self.material_colors(material, || (*point, *hit));
         let here = Meeting { view, hit, point };
 
         // Ambient, then each light: diffuse and highlight.
@@ -52,7 +53,7 @@ impl<I: Answers> Tracer<'_, I> {
             let Some(illumination) = Illumination::at(light, point) else { continue };
             let visible = self.visibility(&here, &illumination);
             if visible != Rgb::ZERO {
-                color += self.lit(visible, &illumination, colors.diffuse, point, view);
+                color += self.lit(visible, &illumination, material, colors.diffuse, point, view);
             }
         }
 
@@ -66,7 +67,22 @@ impl<I: Answers> Tracer<'_, I> {
             }
         }
 
-        self.clamp(color)
+        self.clamp(self.after_way_inside(color, material, point, view))
+    }
+
+    /// What is left of a colour at the end of a ray's way, which may have led through what absorbs.
+    #[inline(always)]
+    pub(super) fn after_way_inside(
+        &self,
+        color: Rgb,
+        material: &Material,
+        point: &SurfacePoint,
+        view: &ViewRay,
+    ) -> Rgb {
+        if point.from_outside || !material.is_absorbing() {
+            return color;
+        }
+        color * material.left_after(length(point.position - view.origin))
     }
 
     /// What is done to a colour after each Shade.
@@ -91,11 +107,11 @@ impl<I: Answers> Tracer<'_, I> {
         &self,
         visible: Rgb,
         illumination: &Illumination,
+        material: &Material,
         diffuse: Rgb,
         point: &SurfacePoint,
         view: &ViewRay,
     ) -> Rgb {
-        let material = &self.scene.materials[point.material as usize];
         if self.is_opaque() {
             return illumination.color * direct(material, diffuse, point, view, illumination);
         }
@@ -112,7 +128,7 @@ impl<I: Answers> Tracer<'_, I> {
     /// The colours of the point that `hit` found.
     #[inline(always)]
     pub fn colors(&self, point: &SurfacePoint, hit: &Hit) -> SurfaceColors {
-        self.material_colors(&self.scene.materials[point.material as usize], || (*point, *hit))
+        self.material_colors(&self.terms(point, hit), || (*point, *hit))
     }
 
     /// The colours of a material at the point that a hit found, which is asked for only if there is an image.
@@ -129,15 +145,14 @@ impl<I: Answers> Tracer<'_, I> {
             }
             _ => material.diffuse,
         };
-        let ambient = material.ambient.unwrap_or(self.scene.ambient * diffuse);
+        let ambient = material.ambient.unwrap_or(self.scene.ambient * diffuse * material.coverage);
         SurfaceColors { ambient: ambient + material.emission, diffuse }
     }
 
     /// What an image has at a point. Out of line, since scenes without images need not pay.
     #[inline(never)]
     fn texel(&self, reference: &TextureRef, point: &SurfacePoint, hit: &Hit) -> Rgb {
-        let uv = point.texture_coordinates(self.scene, hit);
-        self.scene.textures[reference.texture as usize].sample(reference.place(uv))
+        ImagePlace::of(self.scene, self.world, point, hit).texel(reference).truncate()
     }
 
     /// The mirror ray of a point, counted.

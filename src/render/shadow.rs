@@ -5,7 +5,7 @@ use glam::DVec3;
 use crate::error::{Error, Result};
 use crate::math::lanes::{Flags, LANES, Numbers, Vectors, Vectors32, whole_rows};
 use crate::math::simd::{Level, Task};
-use crate::math::vector::{dot, is_safe, normalize};
+use crate::math::vector::{dot, is_safe, length, normalize};
 use crate::render::answers::{Answers, Meeting};
 use crate::render::points::Points;
 use crate::render::surface::SurfacePoint;
@@ -248,17 +248,29 @@ impl<I: Answers> Tracer<'_, I> {
         if self.intersect.is_blocked_by_opaque(&ray) {
             return Rgb::ZERO;
         }
-        self.visible_through(&ray)
+        self.visible_through(&ray, from.point, illumination)
     }
 
-    /// The same for a shadow ray that nothing opaque blocks.
-    pub(super) fn visible_through(&self, ray: &I::Ray) -> Rgb {
+    /// The same for a shadow ray from a point that nothing opaque blocks.
+    pub(super) fn visible_through(&self, ray: &I::Ray, from: &SurfacePoint, illumination: &Illumination) -> Rgb {
         let mut visible = Rgb::ONE;
         if self.is_opaque() {
             return visible;
         }
+        // The light's place is at t = 1, but for lights far away, whose direction has unit length.
+        let scale = illumination.position.map_or(1.0, |position| length(position - from.position));
+        let mut before = 0.0;
         self.intersect.visit_transmissive(ray, |hit| {
-            visible *= self.scene.materials[self.scene.material_of(hit.instance, hit.primitive) as usize].kt;
+            visible *= self.passes(hit, -illumination.to_light);
+            let material = self.material_hit(hit);
+            if material.is_absorbing() {
+                let t = f64::from(hit.t);
+                // What comes out of a solid went through it since it came in, or began inside.
+                if self.is_from_inside(hit, illumination.to_light) {
+                    visible *= material.left_after((t - before) * scale);
+                }
+                before = t;
+            }
             visible != Rgb::ZERO
         });
         visible

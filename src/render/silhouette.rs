@@ -38,6 +38,10 @@ impl<I: Answers> Tracer<'_, I> {
             if !next.is_hit() {
                 return None;
             }
+            if self.has_holes(&next) && self.is_hole(&next, ray.view.direction) {
+                key = next.key();
+                continue;
+            }
             let entry = SurfacePoint::of(self.scene, self.world, &ray.view, &next);
             if entry.from_outside && has_behind(&entry, exit, ray.view.origin) {
                 return Some((next, entry));

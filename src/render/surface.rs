@@ -69,6 +69,13 @@ impl SurfacePoint {
                     let corners = mesh.indices[hit.primitive as usize].map(|i| normals[i as usize]);
                     point.set_shading_normal(instance, corners);
                 }
+                if compiled::NORMALS
+                    && instance.has_normal_maps
+                    && let Some(map) =
+                        scene.materials[material as usize].detail.as_ref().and_then(|d| d.normal.as_ref())
+                {
+                    point.map_normal(scene, world, instance, hit, map);
+                }
                 point
             }
             Shape::Quadric(_) if !compiled::QUADRICS => unreachable!("this build has no quadrics"),

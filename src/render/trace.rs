@@ -64,7 +64,10 @@ impl<'a, I: Answers> Tracer<'a, I> {
     }
 
     fn trace_hit(&self, ray: &TracedRay<I::Ray>, depth: u32) -> (Rgb, Hit) {
-        let hit = self.intersect.first_hit(&ray.ray);
+        let mut hit = self.intersect.first_hit(&ray.ray);
+        if self.world.has_holes {
+            hit = self.beyond_holes(&ray.ray, ray.view.direction, hit);
+        }
         if !hit.is_hit() {
             return (background(&self.scene.background, ray.view.direction), hit);
         }

@@ -5,6 +5,8 @@
 //! shadow rays, then all reflected and refracted rays as the next batch. What these see is added on the way back, so that clamping
 //! comes where it does in the recursion.
 
+use std::borrow::Cow;
+
 use crate::geometry::Hit;
 use crate::math::lanes::{Flags, LANES, Numbers, Vectors, Vectors32, whole_rows};
 use crate::math::simd::{Level, Task};
@@ -15,7 +17,7 @@ use crate::render::shade::{diffused, glossy, r_dot_v, reflect_all};
 use crate::render::shadow::Illuminations;
 use crate::render::trace::{TracedRay, Tracer, background};
 use crate::scene::camera::ViewRay;
-use crate::scene::{Rgb, Shape, compiled};
+use crate::scene::{Material, Rgb, Scene, Shape, compiled};
 
 /// Rays that are traced together. More make packets of rays that go alike, but what is known of them leaves the cache.
 pub const LARGEST: usize = 1024;
@@ -40,6 +42,10 @@ struct Block {
     is_glossy: bool,
     /// Whether a material reflects or lets light through.
     goes_on: bool,
+    /// Whether a material absorbs light inside.
+    absorbs: bool,
+    /// The terms of those materials that differ from point to point: their numbers follow those of the scene's.
+    local: Vec<Material>,
 }
 
 const MIXED: u32 = u32::MAX;
@@ -51,7 +57,10 @@ const MOST_BLOCKS: usize = 2 * LARGEST / LANES;
 /// What a ray's colour still lacks.
 struct Pending {
     ray: u32,
-    material: u32,
+    kr: Rgb,
+    kt: Rgb,
+    /// What is left of all at the end of the ray's way.
+    left: Rgb,
     /// Positions among the rays of the next depth.
     reflected: Option<u32>,
     transmitted: Option<u32>,
@@ -88,6 +97,11 @@ impl<I: Answers> Tracer<'_, I> {
     fn trace_wave(&self, traced: Rays<I::Ray>, depth: u32) -> (Vec<Rgb>, Vec<Hit>) {
         let mut hits = vec![Hit::MISS; traced.rays.len()];
         self.timed(traversal, || self.intersect.first_hits(&traced.rays, &mut hits));
+        if self.world.has_holes {
+            for ((hit, ray), view) in hits.iter_mut().zip(&traced.rays).zip(&traced.views) {
+                *hit = self.beyond_holes(ray, view.direction, *hit);
+            }
+        }
         let mut colors = vec![Rgb::ZERO; hits.len()];
         let mut blocks = Blocks::default();
         for (number, (hit, color)) in hits.iter().zip(&mut colors).enumerate() {
@@ -113,7 +127,7 @@ impl<I: Answers> Tracer<'_, I> {
             let meetings = block.meetings(&traced.views);
             if !(deeper && block.goes_on) {
                 for (at, &ray) in block.found.rays[..block.found.count].iter().enumerate() {
-                    colors[ray as usize] = self.clamp(block.color.get(at));
+                    colors[ray as usize] = self.clamp(block.color.get(at) * self.left(block, at, &traced.views));
                 }
                 continue;
             }
@@ -121,18 +135,20 @@ impl<I: Answers> Tracer<'_, I> {
             let mut reflected = next.rays.len() as u32;
             let reflects = self.reflect_block(block, &meetings, &mut next);
             for at in 0..block.found.count {
-                let (ray, color, number) = (block.found.rays[at], block.color.get(at), block.points.materials[at]);
-                let material = &self.scene.materials[number as usize];
+                let (ray, color) = (block.found.rays[at], block.color.get(at));
+                let material = block.material(self.scene, at);
+                let left = self.left(block, at, &traced.views);
                 let reflects = reflects[at] != 0;
                 let transmits = !self.is_opaque() && material.is_transmissive();
                 if !reflects && !transmits {
-                    colors[ray as usize] = self.clamp(color);
+                    colors[ray as usize] = self.clamp(color * left);
                     continue;
                 }
                 colors[ray as usize] = color;
                 let transmitted =
                     transmits.then(|| next.push(meetings.with(at, |here| self.transmitted(here, material))));
-                pending.push(Pending { ray, material: number, reflected: reflects.then_some(reflected), transmitted });
+                let (kr, kt) = (material.kr, material.kt);
+                pending.push(Pending { ray, kr, kt, left, reflected: reflects.then_some(reflected), transmitted });
                 reflected += u32::from(reflects);
             }
         }
@@ -141,15 +157,14 @@ impl<I: Answers> Tracer<'_, I> {
         if !pending.is_empty() {
             let seen = self.trace_all(next, depth + 1);
             for one in pending {
-                let material = &self.scene.materials[one.material as usize];
                 let color = &mut colors[one.ray as usize];
                 if let Some(at) = one.reflected {
-                    *color += material.kr * seen[at as usize];
+                    *color += one.kr * seen[at as usize];
                 }
                 if let Some(at) = one.transmitted {
-                    *color += material.kt * seen[at as usize];
+                    *color += one.kt * seen[at as usize];
                 }
-                *color = self.clamp(*color);
+                *color = self.clamp(*color * one.left);
             }
         }
         (colors, hits)
@@ -187,11 +202,22 @@ impl<I: Answers> Tracer<'_, I> {
                 Some((same, colors)) if same == number => colors,
                 _ => {
                     let material = &self.scene.materials[number as usize];
-                    block.is_glossy |= material.ks != Rgb::ZERO;
-                    block.goes_on |= material.is_reflective() || material.is_transmissive();
+                    let detailed = self.is_detailed(material, &block.found.hits[at]);
                     let point = || (block.points.get(at), block.found.hits[at]);
-                    let colors = self.material_colors(material, point);
-                    last = material.diffuse_texture.is_none().then_some((number, colors));
+                    let terms = if detailed {
+                        self.terms(&block.points.get(at), &block.found.hits[at])
+                    } else {
+                        Cow::Borrowed(material)
+                    };
+                    block.is_glossy |= terms.ks != Rgb::ZERO;
+                    block.goes_on |= terms.is_reflective() || terms.is_transmissive();
+                    block.absorbs |= terms.is_absorbing();
+                    let colors = self.material_colors(&terms, point);
+                    last = (!detailed && material.diffuse_texture.is_none()).then_some((number, colors));
+                    if let Cow::Owned(terms) = terms {
+                        block.points.materials[at] = (self.scene.materials.len() + block.local.len()) as u32;
+                        block.local.push(terms);
+                    }
                     colors
                 }
             };
@@ -200,14 +226,24 @@ impl<I: Answers> Tracer<'_, I> {
         }
     }
 
+    /// What is left of the colour of a block's point at the end of its ray's way; 1 where nothing absorbs.
+    #[inline(always)]
+    fn left(&self, block: &Block, at: usize, views: &[ViewRay]) -> Rgb {
+        if !block.absorbs {
+            return Rgb::ONE;
+        }
+        let view = &views[block.found.rays[at] as usize];
+        self.after_way_inside(Rgb::ONE, block.material(self.scene, at), &block.points.get(at), view)
+    }
+
     /// Adds the mirror rays of a block's points to the next rays, and tells which have one.
     #[inline(never)]
     fn reflect_block(&self, block: &Block, meetings: &Meetings<'_>, next: &mut Rays<I::Ray>) -> Flags {
         let mut reflects = [0; LANES];
         let count = block.found.count;
         let mut any = false;
-        for (flag, &material) in reflects.iter_mut().zip(&block.points.materials[..count]) {
-            let reflective = compiled::REFLECTION && self.scene.materials[material as usize].is_reflective();
+        for (at, flag) in reflects[..count].iter_mut().enumerate() {
+            let reflective = compiled::REFLECTION && block.material(self.scene, at).is_reflective();
             *flag = u32::from(reflective);
             any |= reflective;
         }
@@ -265,17 +301,19 @@ impl<I: Answers> Tracer<'_, I> {
 
     /// Adds the light of one lamp to a point from which nothing opaque hides it.
     fn add_through(&self, ray: &I::Ray, at: usize, views: &[ViewRay], block: &mut Block, from: &Illuminations) {
-        let visible = self.visible_through(ray);
-        if let Some(illumination) = from.get(at).filter(|_| visible != Rgb::ZERO) {
-            let (point, view) = (block.points.get(at), &views[block.found.rays[at] as usize]);
-            let more = self.lit(visible, &illumination, block.diffuse.get(at), &point, view);
+        let Some(illumination) = from.get(at) else { return };
+        let (point, view) = (block.points.get(at), &views[block.found.rays[at] as usize]);
+        let visible = self.visible_through(ray, &point, &illumination);
+        if visible != Rgb::ZERO {
+            let material = block.material(self.scene, at);
+            let more = self.lit(visible, &illumination, material, block.diffuse.get(at), &point, view);
             block.color.set(at, block.color.get(at) + more);
         }
     }
 
     /// Adds the light of one lamp to all points that it reaches, in a scene that lets no light through.
     fn add_light(&self, block: &mut Block, illuminations: &Illuminations) {
-        let Block { found, points, diffuse, color, .. } = block;
+        let Block { found, points, diffuse, color, local, .. } = block;
         let lanes = whole_rows(found.count);
         if !block.is_glossy {
             return Level::chosen().run(AddLight::<false> {
@@ -290,7 +328,7 @@ impl<I: Answers> Tracer<'_, I> {
         let mut r_dot_v = [0.0; LANES];
         Level::chosen().run(Mirrored { lanes, illuminations, points, r_dot_v: &mut r_dot_v });
         for at in (0..found.count).filter(|&at| illuminations.is_lit[at] != 0 && r_dot_v[at] > 0.0) {
-            let material = &self.scene.materials[points.materials[at] as usize];
+            let material = material_of(self.scene, local, points.materials[at]);
             if material.ks != Rgb::ZERO {
                 gloss.color.set(at, glossy(material, r_dot_v[at]));
                 gloss.is_any[at] = 1;
@@ -415,6 +453,13 @@ impl Blocks {
     }
 }
 
+/// A material of the scene, or terms whose numbers follow theirs.
+#[inline(always)]
+fn material_of<'a>(scene: &'a Scene, local: &'a [Material], number: u32) -> &'a Material {
+    let number = number as usize;
+    scene.materials.get(number).unwrap_or_else(|| &local[number - scene.materials.len()])
+}
+
 fn traversal(seconds: &mut ThreadSeconds, spent: f64) {
     seconds.traversal += spent;
 }
@@ -431,7 +476,23 @@ impl<R> Rays<R> {
 impl Block {
     fn new(instance: u32) -> Self {
         let (diffuse, color) = (Vectors32::ZERO, Vectors32::ZERO);
-        Self { found: Found::NONE, instance, points: Points::NONE, diffuse, color, is_glossy: false, goes_on: false }
+        Self {
+            found: Found::NONE,
+            instance,
+            points: Points::NONE,
+            diffuse,
+            color,
+            is_glossy: false,
+            goes_on: false,
+            absorbs: false,
+            local: Vec::new(),
+        }
+    }
+
+    /// The material of a point, or its terms there.
+    #[inline(always)]
+    fn material<'a>(&'a self, scene: &'a Scene, at: usize) -> &'a Material {
+        material_of(scene, &self.local, self.points.materials[at])
     }
 
     fn meetings<'a>(&'a self, views: &'a [ViewRay]) -> Meetings<'a> {

@@ -4,10 +4,12 @@
 use glam::{DAffine3, DMat3, DVec3};
 
 use crate::error::{Error, Result};
+use crate::geometry::mesh::Materials;
 use crate::geometry::ray::Interval;
-use crate::geometry::{Bounds, PreparedRay};
+use crate::geometry::{Bounds, PreparedRay, TriangleMesh};
 use crate::math::Transform;
 use crate::render::shadow::PreparedLight;
+use crate::scene::camera::Pixels;
 use crate::scene::{Material, Rgb, Scene, Shape, compiled};
 
 /// An object as rays meet it.
@@ -24,6 +26,12 @@ pub struct Instance {
     pub bounds: Option<Bounds>,
     /// Whether no part of it lets light through.
     pub opaque: bool,
+    /// Whether some of its surface may not be there.
+    pub has_holes: bool,
+    /// Whether some of its materials have normal maps.
+    pub has_normal_maps: bool,
+    /// Whether its vertices have colours.
+    pub has_colors: bool,
 }
 
 /// All objects and lights of a scene, prepared.
@@ -33,8 +41,52 @@ pub struct World {
     pub instances: Vec<Instance>,
     /// Whether no object lets light through: then a shadow ray is a yes or a no.
     pub all_opaque: bool,
+    /// Whether some surface may not be there.
+    pub has_holes: bool,
     /// The lights, in the scene's order.
     pub lights: Vec<PreparedLight>,
+    /// How large pixels of the active camera are.
+    pub pixels: Pixels,
+}
+
+/// What some of an object's materials do.
+#[derive(Debug, Clone, Copy, Default)]
+struct Traits {
+    lets_light_through: bool,
+    has_holes: bool,
+    has_normal_maps: bool,
+}
+
+impl Traits {
+    fn of(material: &Material) -> Self {
+        Self {
+            lets_light_through: material.lets_light_through(),
+            has_holes: material.has_holes(),
+            has_normal_maps: material.detail.as_ref().is_some_and(|detail| detail.normal.is_some()),
+        }
+    }
+
+    fn or(self, other: Self) -> Self {
+        Self {
+            lets_light_through: self.lets_light_through | other.lets_light_through,
+            has_holes: self.has_holes | other.has_holes,
+            has_normal_maps: self.has_normal_maps | other.has_normal_maps,
+        }
+    }
+
+    /// Those of a mesh's own materials, as far as triangles with them can be hit.
+    fn of_mesh(mesh: &TriangleMesh, materials: &[Self]) -> Self {
+        match &mesh.materials {
+            Materials::One(material) if mesh.live_count() > 0 => materials[*material as usize],
+            Materials::One(_) => Self::default(),
+            Materials::PerTriangle(each) => {
+                let mut used = vec![false; materials.len()];
+                mesh.live_triangles().for_each(|number| used[each[number as usize] as usize] = true);
+                let used = materials.iter().zip(used).filter(|(_, used)| *used);
+                used.fold(Self::default(), |all, (traits, _)| all.or(*traits))
+            }
+        }
+    }
 }
 
 impl World {
@@ -53,39 +105,52 @@ impl World {
             return Err(Error::caller(message));
         }
         let mesh_bounds: Vec<Bounds> = scene.meshes.iter().map(|mesh| mesh.hit_bounds()).collect();
-        let mesh_opaque: Vec<bool> = scene
-            .meshes
-            .iter()
-            .map(|mesh| !mesh.live_triangles().any(|n| scene.materials[mesh.material(n) as usize].is_transmissive()))
-            .collect();
+        let materials: Vec<Traits> = scene.materials.iter().map(Traits::of).collect();
+        let mesh_traits: Vec<Traits> = scene.meshes.iter().map(|mesh| Traits::of_mesh(mesh, &materials)).collect();
         // What a quadric without a material of its own has.
-        let default_opaque = scene.materials.first().is_none_or(|material| !material.is_transmissive());
+        let default_traits = materials.first().copied().unwrap_or_default();
         let prepare = |object: &crate::scene::Object| {
-            let (shape_origin, scale, bounds, opaque) = match object.shape {
+            let (shape_origin, scale, bounds, traits) = match object.shape {
                 Shape::Mesh(mesh) => {
                     let number = mesh as usize;
                     let mesh = &scene.meshes[number];
-                    (mesh.origin, mesh.scale(), Some(mesh_bounds[number]), mesh_opaque[number])
+                    (mesh.origin, mesh.scale(), Some(mesh_bounds[number]), mesh_traits[number])
                 }
                 Shape::Quadric(quadric) => {
-                    (DVec3::ZERO, 1.0, scene.quadrics[quadric as usize].bounds(), default_opaque)
+                    (DVec3::ZERO, 1.0, scene.quadrics[quadric as usize].bounds(), default_traits)
                 }
             };
             let transform = Transform::new(relative(&object.transform, shape_origin, scale, scene.origin))
                 .map_err(|error| error.remedy(format!("object `{}`: scales must not be 0", object.name)))?;
+            let traits = object.material.map_or(traits, |material| materials[material as usize]);
+            let has_colors = match object.shape {
+                Shape::Mesh(mesh) => scene.meshes[mesh as usize].colors.is_some(),
+                Shape::Quadric(_) => false,
+            };
             Ok(Instance {
                 shape: object.shape,
                 identity: transform.is_identity(),
                 bounds: bounds.map(|bounds| bounds.to_world(&transform)),
-                opaque: object.material.map_or(opaque, |m| !scene.materials[m as usize].is_transmissive()),
+                opaque: !traits.lets_light_through,
+                has_holes: traits.has_holes,
+                has_normal_maps: traits.has_normal_maps,
+                has_colors,
                 transform,
             })
         };
         let instances = scene.objects.iter().map(prepare).collect::<Result<Vec<_>>>()?;
         let all_opaque = instances.iter().all(|instance| instance.opaque);
         let lights = scene.lights.iter().map(|light| PreparedLight::new(light, scene.origin)).collect::<Result<_>>()?;
-        Ok(Self { instances, all_opaque, lights })
+        let has_holes = instances.iter().any(|instance| instance.has_holes);
+        Ok(Self { instances, all_opaque, has_holes, lights, pixels: pixels(scene) })
     }
+}
+
+/// How large the pixels of the active camera are; its flaws are told where rays are made.
+fn pixels(scene: &Scene) -> Pixels {
+    let Some(named) = scene.cameras.get(scene.active_camera) else { return Pixels::NONE };
+    let rays = named.camera.rays(scene.film.width, scene.film.height, scene.origin);
+    rays.map_or(Pixels::NONE, |rays| rays.pixels(scene.film.samples))
 }
 
 impl Instance {

@@ -187,6 +187,60 @@ impl CameraRays {
     }
 }
 
+/// How large pixels are on what they show.
+#[derive(Debug, Clone, Copy)]
+pub struct Pixels {
+    /// Where they are seen from, relative to the scene's origin.
+    eye: DVec3,
+    /// The direction of all rays; `None` if they come together in the eye.
+    parallel: Option<DVec3>,
+    /// The side of a pixel: at a distance of 1 from the eye, or anywhere for parallel rays. 0 if there is no camera.
+    side: f64,
+}
+
+impl Pixels {
+    /// No camera.
+    pub const NONE: Self = Self { eye: DVec3::ZERO, parallel: None, side: 0.0 };
+
+    /// The side of a square as large as what one sees of a surface, with this unit normal, at a point.
+    ///
+    /// Seen in mirrors it is that of the straight line from the eye, which is shorter than the ray's way.
+    pub fn side_at(&self, position: DVec3, normal: DVec3) -> f64 {
+        // Beyond 16 times as long as wide samples do what is left to do.
+        let stretch = |cosine: f64| 1.0 / cosine.abs().max(1.0 / 16.0).sqrt();
+        match self.parallel {
+            Some(direction) => self.side * stretch(dot(normal, direction)),
+            None => {
+                let offset = position - self.eye;
+                let distance = dot(offset, offset).sqrt();
+                if distance > 0.0 { self.side * distance * stretch(dot(normal, offset) / distance) } else { 0.0 }
+            }
+        }
+    }
+}
+
+impl CameraRays {
+    /// How large pixels are of which each has so many samples: a sample's share of one.
+    pub fn pixels(&self, samples: u32) -> Pixels {
+        let share = 1.0 / f64::from(samples).sqrt();
+        let length = |v: DVec3| dot(v, v).sqrt();
+        match self.kind {
+            RayKind::Perspective { eye, up, .. } => {
+                Pixels { eye, parallel: None, side: 2.0 * length(up) / self.height * share }
+            }
+            RayKind::Parallel { eye, forward, up, .. } => {
+                Pixels { eye, parallel: Some(forward), side: 2.0 * length(up) / self.height * share }
+            }
+            RayKind::FourPoint { viewpoint, corner, step_i, step_j } => {
+                let middle = corner + step_i * (0.5 * (self.width - 1.0)) + step_j * (0.5 * (self.height - 1.0));
+                let side = length(cross(step_i, step_j)).sqrt() / length(middle - viewpoint);
+                let side = if side.is_finite() { side * share } else { 0.0 };
+                Pixels { eye: viewpoint, parallel: None, side }
+            }
+        }
+    }
+}
+
 /// Rays number by number.
 struct Formed {
     origin: Vectors,
@@ -265,6 +319,35 @@ mod tests {
         assert!((right_edge - DVec3::new(2.0, 0.0, -1.0) / 5f64.sqrt()).abs().max_element() < 1e-15);
         let top = rays.ray(DVec2::new(100.0, 0.0)).unwrap().direction;
         assert!((top - DVec3::new(0.0, 1.0, -1.0) / 2f64.sqrt()).abs().max_element() < 1e-15);
+    }
+
+    #[test]
+    fn pixels_are_as_large_as_neighbouring_rays_are_apart() {
+        let eye = DVec3::new(1.0, 2.0, 8.0);
+        let look = |projection| Camera::LookAt { eye, target: DVec3::new(1.0, 2.0, 0.0), up: DVec3::Y, projection };
+        let four_point = Camera::FourPoint {
+            viewpoint: eye,
+            lower_left: DVec3::new(0.0, 1.0, 4.0),
+            lower_right: DVec3::new(2.0, 1.0, 4.0),
+            upper_left: DVec3::new(0.0, 3.0, 4.0),
+        };
+        let cameras =
+            [look(Projection::Perspective { fov_y: 0.5 }), look(Projection::Orthographic { height: 3.0 }), four_point];
+        for camera in cameras {
+            let rays = camera.rays(101, 101, DVec3::ZERO).unwrap();
+            // Where they meet the plane z = 0.
+            let at = |x: f64| {
+                let ray = rays.ray(DVec2::new(x, 50.5)).unwrap();
+                ray.origin - ray.direction * (ray.origin.z / ray.direction.z)
+            };
+            let apart = at(51.0).x - at(50.0).x;
+            let side = rays.pixels(1).side_at(at(50.5), DVec3::Z);
+            assert!((side / apart - 1.0).abs() < 1e-3, "{camera:?}: {side} {apart}");
+            assert!((rays.pixels(16).side_at(at(50.5), DVec3::Z) / apart - 0.25).abs() < 1e-3);
+            let tilted = normalize(DVec3::new(0.0, 3f64.sqrt(), 1.0)).unwrap();
+            assert!((rays.pixels(1).side_at(at(50.5), tilted) / side - 2f64.sqrt()).abs() < 1e-2, "half as wide");
+        }
+        assert_eq!(Pixels::NONE.side_at(DVec3::ONE, DVec3::Z), 0.0);
     }
 
     #[test]

@@ -67,6 +67,8 @@ pub struct Material {
     pub ior: f32,
     /// What is absorbed inside, per unit of length: over a distance d there remains `exp(-absorption d)` (Beer's law).
     pub absorption: Rgb,
+    /// How much of the surface is there: multiplies the ambient colour where that is the scene's.
+    pub coverage: f32,
     /// Shade with the face's normal even where the mesh has smooth ones.
     pub flat: bool,
     /// Whether the backs of triangles are not there.
@@ -97,6 +99,7 @@ impl Material {
         kt: Rgb::ZERO,
         ior: 1.5,
         absorption: Rgb::ZERO,
+        coverage: 1.0,
         flat: false,
         single_sided: false,
         detail: None,
@@ -114,7 +117,12 @@ impl Material {
 
     /// Whether the surface may not be there at some points.
     pub fn has_holes(&self) -> bool {
-        self.single_sided || self.detail.as_ref().is_some_and(|detail| detail.alpha.is_some())
+        self.single_sided || self.has_alpha()
+    }
+
+    /// Whether alpha may differ from 1.
+    pub fn has_alpha(&self) -> bool {
+        self.detail.as_ref().is_some_and(|detail| detail.alpha.is_some())
     }
 
     /// Whether it mirrors.
@@ -125,6 +133,11 @@ impl Material {
     /// Whether anything is absorbed inside.
     pub fn is_absorbing(&self) -> bool {
         self.absorption != Rgb::ZERO
+    }
+
+    /// What is left of light that went so far inside.
+    pub fn left_after(&self, distance: f64) -> Rgb {
+        Rgb::from_array(self.absorption.to_array().map(|share| libm::exp(-f64::from(share) * distance) as f32))
     }
 
     /// Every use of a texture.
@@ -152,6 +165,7 @@ impl Material {
             kt: self.kt,
             ior: self.ior,
             absorption: self.absorption,
+            coverage: self.coverage,
             flat: self.flat,
             single_sided: self.single_sided,
             ..Self::NAMELESS
@@ -183,6 +197,7 @@ impl Material {
             kr,
             kt: (self.kt * alpha + Rgb::splat(1.0 - alpha)).min(Rgb::ONE - kr),
             ior: 1.0,
+            coverage: self.coverage * alpha,
             ..self
         }
     }

@@ -20,8 +20,15 @@ pub struct Surface {
 }
 
 /// A mirror weaker than this in every channel is left out: half of what glass reflects. It keeps rough dielectrics,
-/// the commonest material by far, from costing a ray per hit that nobody could see.
+/// the commonest material by far, from costing a ray per hit that nobody could see. On surfaces darker than
+/// [`DARK`] the bar is lower in proportion, since there is little else to be seen.
 const WEAKEST_MIRROR: f32 = 0.02;
+
+/// Where every channel of the diffuse colour is below this, weaker mirrors count.
+const DARK: f32 = 0.25;
+
+/// What no screen shows, whatever stands beside it.
+const INVISIBLE: f32 = 1.0 / 512.0;
 
 /// The largest exponent of a highlight: its half-width is then below one degree.
 const SHARPEST: f32 = 10_000.0;
@@ -49,9 +56,10 @@ impl Surface {
         let exponent = (0.5 * (1.0 / (width * width) - 1.0)).clamp(1.0, SHARPEST);
 
         let mirror = f0 * fade;
-        let kr = if mirror.max_element() < WEAKEST_MIRROR { Rgb::ZERO } else { mirror };
-        let through = (self.tint * self.transmission * (Rgb::ONE - f0)).clamp(Rgb::ZERO, Rgb::ONE - kr);
         let diffuse = self.matt * (1.0 - self.transmission) + self.metal * (1.0 - fade);
+        let weakest = (WEAKEST_MIRROR * (diffuse.max_element() / DARK).min(1.0)).max(INVISIBLE);
+        let kr = if mirror.max_element() < weakest { Rgb::ZERO } else { mirror };
+        let through = (self.tint * self.transmission * (Rgb::ONE - f0)).clamp(Rgb::ZERO, Rgb::ONE - kr);
 
         // The shading formula weakens the diffuse term by 1 - kt. That is undone, since the diffuse colour already is
         // what remains.
@@ -91,6 +99,8 @@ mod tests {
         assert!((m.ks - 0.01).abs().max_element() < 1e-7);
         assert!(Surface { roughness: 0.3, ..PLASTIC }.phong().kr == Rgb::ZERO);
         assert!(Surface { roughness: 0.2, ..PLASTIC }.phong().kr != Rgb::ZERO);
+        let black = Surface { matt: Rgb::ZERO, f0: Rgb::splat(0.01), roughness: 0.2, ..PLASTIC };
+        assert!(black.phong().kr != Rgb::ZERO, "nothing else is to be seen of it");
     }
 
     #[test]
