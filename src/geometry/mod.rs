@@ -7,6 +7,7 @@ pub mod quadric;
 pub mod quadric_form;
 pub mod ray;
 pub mod shapes;
+pub mod tangents;
 pub mod triangle;
 
 pub use bounds::Bounds;
