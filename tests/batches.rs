@@ -8,6 +8,7 @@ use whitted::formats::{self, LoadOptions};
 use whitted::progress::Silent;
 use whitted::render::trace::Tracer;
 use whitted::render::{RenderSettings, Renderer, sampling};
+use whitted::scene::Scene;
 use whitted::scene::film::Clamp;
 
 #[test]
@@ -19,27 +20,41 @@ fn batches_see_what_the_recursion_sees() {
         for clamp in [Clamp::Shade, Clamp::Output] {
             let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(&name);
             let mut scene = formats::open(&file, &LoadOptions::default(), &Silent).unwrap().scene;
-            // Neither size is a multiple of the side of a block of pixels.
-            (scene.film.width, scene.film.height, scene.film.samples) = (41, 27, 3);
             scene.film.clamp = clamp;
-            let renderer = Renderer::build(scene, &Params::default(), &Silent).unwrap();
-            let film = renderer.render(&RenderSettings::default(), &Silent).unwrap();
-            let scene = renderer.scene();
-            let camera = scene.camera().rays(41, 27, scene.origin).unwrap();
-            let tracer = Tracer::new(scene, renderer.world(), &renderer);
-            for (number, found) in film.color.iter().enumerate() {
-                let (x, y) = (number as u32 % 41, number as u32 / 41);
-                let mut sum = [0.0f64; 3];
-                for sample in 0..3 {
-                    let at = DVec2::new(x.into(), y.into()) + sampling::position(x, y, sample, 3);
-                    let (color, _) = tracer.trace_camera(camera.ray(at).unwrap());
-                    for (sum, value) in sum.iter_mut().zip(color.to_array()) {
-                        *sum += f64::from(value);
-                    }
-                }
-                assert_eq!(*found, sum.map(|sum| (sum / 3.0) as f32), "{name}, {clamp:?}, pixel {x}, {y}");
-            }
-            assert_eq!(film.stats.rays, tracer.counts(), "{name}");
+            check(scene, &format!("{name}, {clamp:?}"));
         }
     }
+}
+
+#[test]
+fn batches_see_details_as_the_recursion_does() {
+    for clamp in [Clamp::Shade, Clamp::Output] {
+        let mut scene = crate::detail::everything();
+        scene.film.clamp = clamp;
+        check(scene, &format!("detail, {clamp:?}"));
+    }
+}
+
+/// Renders a small picture in both ways.
+fn check(mut scene: Scene, name: &str) {
+    // Neither size is a multiple of the side of a block of pixels.
+    (scene.film.width, scene.film.height, scene.film.samples) = (41, 27, 3);
+    let renderer = Renderer::build(scene, &Params::default(), &Silent).unwrap();
+    let film = renderer.render(&RenderSettings::default(), &Silent).unwrap();
+    let scene = renderer.scene();
+    let camera = scene.camera().rays(41, 27, scene.origin).unwrap();
+    let tracer = Tracer::new(scene, renderer.world(), &renderer);
+    for (number, found) in film.color.iter().enumerate() {
+        let (x, y) = (number as u32 % 41, number as u32 / 41);
+        let mut sum = [0.0f64; 3];
+        for sample in 0..3 {
+            let at = DVec2::new(x.into(), y.into()) + sampling::position(x, y, sample, 3);
+            let (color, _) = tracer.trace_camera(camera.ray(at).unwrap());
+            for (sum, value) in sum.iter_mut().zip(color.to_array()) {
+                *sum += f64::from(value);
+            }
+        }
+        assert_eq!(*found, sum.map(|sum| (sum / 3.0) as f32), "{name}, pixel {x}, {y}");
+    }
+    assert_eq!(film.stats.rays, tracer.counts(), "{name}");
 }

@@ -6,6 +6,7 @@ mod batches;
 mod bench;
 mod command_line;
 mod common;
+mod detail;
 mod diff;
 mod far_from_origin;
 mod golden;
