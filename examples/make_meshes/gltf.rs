@@ -63,6 +63,14 @@ impl Writer {
         self.meshes.len() - 1
     }
 
+    /// Adds a mesh that was added before with another material, and returns its number; nothing is stored twice.
+    pub fn add_mesh_again(&mut self, number: usize, material: usize) -> usize {
+        let mut mesh = self.meshes[number].clone();
+        mesh["primitives"][0]["material"] = json!(material);
+        self.meshes.push(mesh);
+        self.meshes.len() - 1
+    }
+
     /// Refers to a picture in a file of its own and returns its number.
     pub fn add_image_file(&mut self, name: &str) -> usize {
         self.images.push(json!({ "uri": name }));

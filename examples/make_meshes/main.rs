@@ -10,6 +10,7 @@
 mod cornell_box;
 mod gltf;
 mod mesh;
+mod metal_roughness;
 mod obj;
 mod patches;
 mod picture;
@@ -39,10 +40,11 @@ impl OutputFile {
 }
 
 /// What can be made: its name, and whether it is kept in `meshes/`.
-const MODELS: [(&str, bool); 8] = [
+const MODELS: [(&str, bool); 9] = [
     ("teapot", true),
     ("cornell_box", true),
     ("textured_crate", true),
+    ("metal_roughness", true),
     ("checker", true),
     ("icosphere", true),
     ("torus", true),
@@ -68,6 +70,7 @@ fn make(name: &str, terrain_triangles: u32) -> Option<Vec<OutputFile>> {
             ]
         }
         "textured_crate" => textured_crate::files(),
+        "metal_roughness" => metal_roughness::files(),
         "checker" => vec![OutputFile::new("checker.png", picture::checker().png())],
         "icosphere" => {
             let comment = "The unit sphere: an icosahedron cut into four twice. Made by the example make_meshes.";

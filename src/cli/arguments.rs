@@ -323,7 +323,7 @@ impl RenderArguments {
     /// As the renderer takes them; a kind of extra values that was named twice counts once.
     pub fn settings(&self) -> RenderSettings {
         let aovs = AovKind::ALL.into_iter().filter(|kind| self.aov.contains(kind)).collect();
-        RenderSettings { threads: self.build.threads as usize, crop: self.film.crop, aovs }
+        RenderSettings { threads: self.build.threads as usize, crop: self.film.crop, aovs, coverage: self.verbose }
     }
 }
 

@@ -190,6 +190,7 @@ mod tests {
             aovs: Vec::new(),
             settings: FilmSettings::default(),
             complete: true,
+            coverage: None,
             stats: RenderStats::default(),
         };
         assert_eq!(film_bytes(&film), 6 * 12);

@@ -51,6 +51,7 @@ pub fn picture(difference: &PictureDifference) -> Film {
         alpha: None,
         aovs: Vec::new(),
         settings: FilmSettings { width, height, transfer: Transfer::Linear, ..FilmSettings::default() },
+        coverage: None,
         complete: true,
         stats: RenderStats::default(),
     }

@@ -1,6 +1,6 @@
 //! The rendered picture, linear and in floats.
 
-use crate::render::settings::{Crop, RenderStats};
+use crate::render::settings::{Coverage, Crop, RenderStats};
 use crate::scene::FilmSettings;
 
 /// Extra values a pixel, beside its colour.
@@ -78,6 +78,8 @@ pub struct Film {
     pub settings: FilmSettings,
     /// Whether every pixel was rendered; false after a cancellation, when missing pixels are black.
     pub complete: bool,
+    /// What pixels show, where that was asked for.
+    pub coverage: Option<Coverage>,
     /// Counts and times.
     pub stats: RenderStats,
 }

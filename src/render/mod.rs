@@ -31,4 +31,4 @@ pub use answers::Answers;
 pub use film::{Aov, AovKind, Film};
 pub use intersect::Intersect;
 pub use renderer::{BuildStats, Renderer};
-pub use settings::{Crop, RayCounts, RenderSettings, RenderStats, ThreadSeconds};
+pub use settings::{Coverage, Crop, RayCounts, RenderSettings, RenderStats, ThreadSeconds};

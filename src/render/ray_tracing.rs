@@ -1,5 +1,7 @@
 //! `RayTracing`: the frame loop, tile by tile.
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use glam::DVec2;
 use rayon::prelude::*;
 
@@ -9,13 +11,13 @@ use crate::progress::Progress;
 use crate::render::answers::Answers;
 use crate::render::film::{Aov, AovKind, Film};
 use crate::render::sampling::{Positions, position};
-use crate::render::settings::{Crop, RayCounts, RenderSettings, RenderStats, ThreadSeconds};
+use crate::render::settings::{Coverage, Crop, RayCounts, RenderSettings, RenderStats, ThreadSeconds};
 use crate::render::surface::SurfacePoint;
 use crate::render::trace::Tracer;
 use crate::render::wave::LARGEST;
 use crate::render::world::World;
 use crate::scene::camera::{CameraRays, ViewRay};
-use crate::scene::{Background, Rgb, Scene};
+use crate::scene::{Background, Rgb, Scene, Shape};
 
 /// Side of a tile in pixels: 32 x 32 pixels keep a thread busy for long enough and share well.
 const TILE: u32 = 32;
@@ -72,12 +74,13 @@ pub fn ray_tracing<I: Answers>(
         .build()
         .map_err(|cause| Error::limit(format!("cannot start {} threads: {cause}", settings.threads)))?;
 
+    let counter = settings.coverage.then(|| Counter::new(scene));
     let tiles = tiles_of(area);
     progress.begin("render", tiles.len() as u64);
     let start = std::time::Instant::now();
     let render_tile = |&tile: &Crop| {
         let tracer = Tracer::new(scene, world, intersect);
-        let finished = tile_pixels(&tracer, &camera, tile, &settings.aovs, progress)?;
+        let finished = tile_pixels(&tracer, &camera, tile, &settings.aovs, counter.as_ref(), progress)?;
         progress.advance(1);
         Some(finished)
     };
@@ -100,6 +103,7 @@ pub fn ray_tracing<I: Answers>(
             .collect(),
         settings: *film,
         complete: finished.iter().all(Option::is_some),
+        coverage: counter.map(Counter::finish),
         stats: RenderStats { seconds, threads: pool.current_num_threads(), ..RenderStats::default() },
     };
     for tile in finished.into_iter().flatten() {
@@ -135,6 +139,7 @@ fn tile_pixels<I: Answers>(
     camera: &CameraRays,
     area: Crop,
     aovs: &[AovKind],
+    counter: Option<&Counter>,
     progress: &dyn Progress,
 ) -> Option<Tile> {
     let pixels = ((area.x1 - area.x0) * (area.y1 - area.y0)) as usize;
@@ -164,6 +169,9 @@ fn tile_pixels<I: Answers>(
         pixels_together(tracer, camera, some, |x, y, pixel| {
             let at = ((y - area.y0) * width + (x - area.x0)) as usize;
             tile.color[at] = pixel.color;
+            if let Some(counter) = counter {
+                counter.count(tracer.scene, &pixel.hit);
+            }
             if transparent {
                 tile.alpha[at] = pixel.alpha;
             }
@@ -303,6 +311,34 @@ impl<F: FnMut(u32, u32, Pixel)> Samples<'_, F> {
             let alpha = (f64::from(pixel.covered) / samples) as f32;
             (self.finished)(x, y, Pixel { color, alpha, hit: pixel.first.unwrap_or(Hit::MISS) });
         }
+    }
+}
+
+/// Counts what pixels show, on all threads at once.
+struct Counter {
+    materials: Vec<AtomicU64>,
+    meshes: Vec<AtomicU64>,
+}
+
+impl Counter {
+    fn new(scene: &Scene) -> Self {
+        let zeros = |count: usize| (0..count).map(|_| AtomicU64::new(0)).collect();
+        Self { materials: zeros(scene.materials.len()), meshes: zeros(scene.meshes.len()) }
+    }
+
+    fn count(&self, scene: &Scene, hit: &Hit) {
+        if !hit.is_hit() {
+            return;
+        }
+        self.materials[scene.material_of(hit.instance, hit.primitive) as usize].fetch_add(1, Ordering::Relaxed);
+        if let Shape::Mesh(mesh) = scene.objects[hit.instance as usize].shape {
+            self.meshes[mesh as usize].fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    fn finish(self) -> Coverage {
+        let numbers = |counts: Vec<AtomicU64>| counts.into_iter().map(AtomicU64::into_inner).collect();
+        Coverage { materials: numbers(self.materials), meshes: numbers(self.meshes) }
     }
 }
 

@@ -24,6 +24,17 @@ pub struct RenderSettings {
     pub crop: Option<Crop>,
     /// Extra values to record.
     pub aovs: Vec<AovKind>,
+    /// Whether to count the pixels that show each material and each mesh.
+    pub coverage: bool,
+}
+
+/// How many pixels show what: of each, the first sample counts.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Coverage {
+    /// Of each of the scene's materials.
+    pub materials: Vec<u64>,
+    /// Of each of the scene's meshes.
+    pub meshes: Vec<u64>,
 }
 
 /// Rays traced, by kind.

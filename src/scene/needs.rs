@@ -23,6 +23,14 @@ pub struct Needs {
     pub reflective_materials: u64,
     /// Materials in use that let light through: shadow rays through them are attenuated, not blocked.
     pub transmissive_materials: u64,
+    /// Materials in use whose surface is not everywhere, or shown by its alpha, or only from the front.
+    pub materials_with_holes: u64,
+    /// Materials in use whose terms differ from point to point beside the diffuse texture.
+    pub detailed_materials: u64,
+    /// Materials in use with a normal map.
+    pub normal_mapped_materials: u64,
+    /// Meshes whose vertices have colours.
+    pub colored_meshes: u64,
     /// Lights.
     pub lights: u64,
     /// Whether the background is an image.
@@ -44,12 +52,17 @@ impl Needs {
             }
         }
         for (material, _) in scene.materials.iter().zip(scene.used_materials()).filter(|(_, used)| *used) {
-            needs.textured_materials += u64::from(material.diffuse_texture.is_some());
+            needs.textured_materials += u64::from(material.textures().next().is_some());
+            needs.materials_with_holes += u64::from(material.has_holes());
+            needs.detailed_materials += u64::from(material.detail.is_some());
+            let normal = material.detail.as_ref().and_then(|detail| detail.normal.as_ref());
+            needs.normal_mapped_materials += u64::from(normal.is_some());
             needs.reflective_materials += u64::from(material.is_reflective());
             needs.transmissive_materials += u64::from(material.is_transmissive());
         }
         needs.smooth_meshes = scene.meshes.iter().filter(|mesh| mesh.normals.is_some()).count() as u64;
         needs.uv_meshes = scene.meshes.iter().filter(|mesh| mesh.uvs.is_some()).count() as u64;
+        needs.colored_meshes = scene.meshes.iter().filter(|mesh| mesh.colors.is_some()).count() as u64;
         needs.background_image = matches!(scene.background, Background::Image { .. });
         needs
     }

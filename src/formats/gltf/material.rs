@@ -320,7 +320,10 @@ impl Reading<'_, '_, '_> {
             self.note(Treatment::Ignored, "thicknessTexture: the thickness of the mesh counts");
         }
         if !self.source.double_sided && !self.reader.cull_back_faces {
-            self.note(Treatment::Approximated, "single-sided material: seen from both sides (see --cull-back-faces)");
+            self.note(
+                Treatment::Honoured,
+                "single-sided material: seen from both sides unless --cull-back-faces is given",
+            );
         }
         if self.source.double_sided || self.reader.cull_back_faces {
             self.note(Treatment::Honoured, "doubleSided");

@@ -199,6 +199,7 @@ mod tests {
             aovs: Vec::new(),
             settings: FilmSettings { width: 3, height: 2, ..Default::default() },
             complete: true,
+            coverage: None,
             stats: RenderStats::default(),
         }
     }

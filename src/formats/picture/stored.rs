@@ -223,6 +223,7 @@ mod tests {
             aovs: vec![Aov { kind: AovKind::Id, channels: vec![vec![f32::from_bits(7); 2], vec![0.0; 2]] }],
             settings: FilmSettings { width: 2, height: 1, ..Default::default() },
             complete: true,
+            coverage: None,
             stats: RenderStats::default(),
         }
     }

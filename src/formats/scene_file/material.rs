@@ -5,11 +5,12 @@ use glam::DVec2;
 use crate::error::Result;
 use crate::formats::scene_file::read::Reader;
 use crate::formats::scene_file::value::{Fields, Value};
+use crate::scene::detail::Rule;
 use crate::scene::texture::{Filter, Wrap};
 use crate::scene::{Material, Rgb, TextureRef};
 
 /// The fields that materials and overrides share.
-const FIELDS: [&str; 13] = [
+const FIELDS: [&str; 14] = [
     "ambient",
     "emission",
     "diffuse",
@@ -21,9 +22,13 @@ const FIELDS: [&str; 13] = [
     "kt",
     "opacity",
     "ior",
+    "absorption",
     "flat",
     "name",
 ];
+
+/// Those that glTF's models of surfaces give.
+const TERMS: [&str; 7] = ["diffuse", "specular", "ks", "shininess", "kr", "kt", "opacity"];
 
 /// Weights that sum to 1 in the file may exceed it by their rounding to f32.
 const WEIGHT_ROUNDING: f32 = 2.0 * f32::EPSILON;
@@ -44,6 +49,15 @@ pub fn read_override(fields: &Fields<'_>, imported: &Material, reader: &mut Read
     let own: Vec<&str> = FIELDS.iter().copied().filter(|&key| key != "name").chain(["material"]).collect();
     fields.accept(&own)?;
     let mut material = imported.clone();
+    if let Some(detail) = &mut material.detail {
+        // What is set by hand is not computed from images.
+        if TERMS.iter().any(|key| fields.has(key)) {
+            detail.rule = Rule::Phong { highlight: None };
+        }
+        if fields.has("kt") || fields.has("opacity") {
+            detail.alpha = None;
+        }
+    }
     change(&mut material, fields, reader)?;
     Ok(material)
 }
@@ -71,6 +85,7 @@ fn change(material: &mut Material, fields: &Fields<'_>, reader: &mut Reader<'_>)
     }
     material.shininess = fields.or("shininess", f64::from(material.shininess), |v| v.between(0.0..=1e6))? as f32;
     material.ior = fields.or("ior", f64::from(material.ior), |value| value.between(0.01..=100.0))? as f32;
+    material.absorption = fields.or("absorption", material.absorption, Value::weight)?;
     material.flat = fields.or("flat", material.flat, Value::boolean)?;
     if let Some(texture) = fields.get("texture") {
         material.diffuse_texture = read_texture(&texture, reader)?;

@@ -213,7 +213,7 @@ impl Reader<'_> {
             return Ok(texture.clone());
         }
         self.ledger.note_file(&path);
-        let texture = read_texture(&path)?;
+        let texture = read_texture(&path)?.with_levels();
         self.images.insert(key, texture.clone());
         Ok(texture)
     }
