@@ -61,15 +61,19 @@ fn folder() -> PathBuf {
 
 /// Renders a scene and compares it with its picture, or writes that.
 fn check(name: &str) {
-    let rendered = render(&folder().join(name).with_extension("toml"));
+    compare(name, &render(&folder().join(name).with_extension("toml")));
+}
+
+/// Compares a PNG with the golden one of this name, or writes that.
+pub fn compare(name: &str, rendered: &[u8]) {
     let golden = folder().join(name).with_extension("png");
     if std::env::var_os(REGENERATE).is_some() {
-        fs::write(&golden, &rendered).unwrap();
+        fs::write(&golden, rendered).unwrap();
         return;
     }
     let expected =
         fs::read(&golden).unwrap_or_else(|error| panic!("{}: {error}; {REGENERATE}=1 writes it", golden.display()));
-    let (expected, actual) = (decode(&expected), decode(&rendered));
+    let (expected, actual) = (decode(&expected), decode(rendered));
     if let Some(difference) = describe(&expected, &actual) {
         let pictures = write_evidence(name, &expected, &actual);
         panic!("{name}: {difference}; see {pictures}");
@@ -114,7 +118,7 @@ fn write_evidence(name: &str, expected: &DynamicImage, actual: &DynamicImage) ->
     fs::create_dir_all(&folder).unwrap();
     let mut paths = Vec::new();
     let mut write = |kind: &str, image: &DynamicImage| {
-        let path = folder.join(format!("{name}.{kind}.png"));
+        let path = folder.join(format!("{}.{kind}.png", name.replace('/', "-")));
         image.save(&path).unwrap();
         paths.push(path.display().to_string());
     };

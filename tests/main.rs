@@ -10,6 +10,7 @@ mod detail;
 mod diff;
 mod far_from_origin;
 mod golden;
+mod golden_models;
 mod hard_cases;
 mod memory;
 mod metamorphic;
