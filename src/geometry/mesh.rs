@@ -271,6 +271,28 @@ impl TriangleMesh {
         self.normals = Some(self.positions.iter().map(normal).collect());
     }
 
+    /// Appends a copy of a vertex and returns its number.
+    ///
+    /// # Errors
+    /// A limit where there are 4294967295 already.
+    pub(crate) fn copy_vertex(&mut self, vertex: u32) -> Result<u32> {
+        fn copy<T: Copy>(values: Option<&mut Vec<T>>, at: usize) {
+            if let Some(values) = values {
+                values.extend(values.get(at).copied());
+            }
+        }
+        let number = u32::try_from(self.positions.len())
+            .map_err(|_| Error::limit(format!("mesh `{}` has more than 4294967295 vertices", self.name)))?;
+        let at = vertex as usize;
+        copy(Some(&mut self.positions), at);
+        copy(self.normals.as_mut(), at);
+        copy(self.uvs.as_mut(), at);
+        copy(self.second_uvs.as_mut(), at);
+        copy(self.colors.as_mut(), at);
+        copy(self.tangents.as_mut(), at);
+        Ok(number)
+    }
+
     /// Bytes of the vertex and index arrays and attributes.
     pub fn bytes(&self) -> usize {
         let per_triangle = match &self.materials {

@@ -3,10 +3,12 @@
 pub mod bounds;
 pub mod hit;
 pub mod mesh;
+pub mod numbering;
 pub mod quadric;
 pub mod quadric_form;
 pub mod ray;
 pub mod shapes;
+pub mod smoothing;
 pub mod tangents;
 pub mod triangle;
 

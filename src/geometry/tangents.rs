@@ -26,6 +26,7 @@ impl TriangleMesh {
         if triangles.is_empty() {
             return Ok(());
         }
+        self.tangents = None;
         let mut corners = Corners::new(self, &triangles);
         generate_tangents(&mut corners).map_err(|cause| Error::limit(format!("no tangents: {cause}")))?;
         let tangents = corners.tangents;
@@ -69,24 +70,6 @@ impl TriangleMesh {
         }
         self.tangents = Some(tangents.into_iter().map(Option::unwrap_or_default).collect());
         Ok(())
-    }
-
-    /// Appends a copy of a vertex, tangents apart, and returns its number.
-    fn copy_vertex(&mut self, vertex: u32) -> Result<u32> {
-        fn copy<T: Copy>(values: Option<&mut Vec<T>>, at: usize) {
-            if let Some(values) = values {
-                values.extend(values.get(at).copied());
-            }
-        }
-        let number = u32::try_from(self.positions.len())
-            .map_err(|_| Error::limit(format!("mesh `{}` has more than 4294967295 vertices", self.name)))?;
-        let at = vertex as usize;
-        copy(Some(&mut self.positions), at);
-        copy(self.normals.as_mut(), at);
-        copy(self.uvs.as_mut(), at);
-        copy(self.second_uvs.as_mut(), at);
-        copy(self.colors.as_mut(), at);
-        Ok(number)
     }
 }
 
