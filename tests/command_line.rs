@@ -531,6 +531,30 @@ fn info_is_readable_and_its_json_is_stable() {
 }
 
 #[test]
+fn strict_fails_on_what_is_not_honoured_and_lists_it() {
+    let workshop = Workshop::new();
+    workshop.succeed("info model.obj --strict");
+    workshop.succeed("render model.obj --size 8x8 --spp 1 --strict");
+    workshop.write("model.mtl", "newmtl floor\nKd 1 1 1\nKa 1 1 1\nodd 1\nnewmtl box\nKa 1 1 1\nKd 1 0 0\n");
+    let before = workshop.names();
+    for command in ["info", "render --quiet", "render --verbose"] {
+        let output = workshop.run(&format!("{command} model.obj --strict"));
+        assert_eq!((output.status.code(), output.stdout.len()), (Some(1), 0), "{command}");
+        let message = text(&output.stderr);
+        let lines: Vec<_> = message.lines().collect();
+        let (last, listed) = lines.split_last().unwrap();
+        assert!(
+            last.starts_with("error: model.obj: 2 features are ") && last.ends_with("leave out --strict to do without")
+        );
+        let ignored: Vec<_> = listed.iter().filter(|line| line.starts_with("ignored: ")).collect();
+        assert_eq!(ignored.len(), 2, "{message}");
+        assert!(ignored.iter().any(|line| line.contains("odd")), "{message}");
+        assert!(ignored.iter().any(|line| line.contains("Ka") && line.contains("2 times")), "{message}");
+    }
+    assert_eq!(workshop.names(), before, "nothing is written");
+}
+
+#[test]
 fn textures_are_named_as_seen_from_the_model() {
     let workshop = Workshop::new();
     let folder = workshop.path("maps");

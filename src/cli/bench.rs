@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueHint};
 
 use super::commit::commit;
+use super::ledger::Told;
 use super::outputs::{refuse_inputs, write_text};
 use super::query::FORMATS;
 use super::ray_input::{MOST_RAYS, read_rays, stem};
@@ -192,7 +193,7 @@ fn measure_all(
         let loaded = formats::open(path, &arguments.load.options(), terminal);
         terminal.clear();
         let Loaded { scene, ledger, .. } = loaded?;
-        ledger::report(&ledger, false);
+        ledger::report(path, &ledger, &scene, Told::Warnings, arguments.load.strict)?;
         measure(&stem(path), scene).map_err(|error| error.at_path(path))?;
     }
     for model in Generated::ALL.into_iter().filter(|model| arguments.generate.contains(model)) {

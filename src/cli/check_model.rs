@@ -8,7 +8,7 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::check::CheckArguments;
-use super::ledger;
+use super::ledger::{self, Told};
 use super::stats_json::SCHEMA;
 use super::terminal::{self, Terminal};
 use crate::accel::{Kind, Params, Preset};
@@ -30,7 +30,7 @@ pub fn run(path: &Path, kinds: &[Kind], arguments: &CheckArguments, terminal: &T
     let loaded = formats::open(path, &LoadOptions::default(), terminal);
     terminal.clear();
     let loaded = loaded?;
-    ledger::report(&loaded.ledger, false);
+    ledger::report(path, &loaded.ledger, &loaded.scene, Told::Warnings, false)?;
     let scene = loaded.scene;
     let structures: Vec<Params> = kinds.iter().flat_map(|&kind| presets(kind)).collect();
     let found = agreement::check(&scene, &structures, &RayFamily::ALL, arguments.rays, arguments.seed, terminal);

@@ -7,10 +7,13 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::arguments::InfoArguments;
+use super::info_text;
+use super::ledger::{self, Told};
 use super::stats_json::{SCHEMA, lossy, lossy_list};
 use super::terminal::{self, Terminal};
-use super::{info_text, ledger};
 use crate::error::{Error, Result};
+use crate::formats::ledger::Entry;
+use crate::formats::reach::{Census, Reach};
 use crate::formats::{self, Ledger, Loaded, Treatment};
 use crate::geometry::TriangleMesh;
 use crate::geometry::mesh::{DroppedCounts, Materials, Rounding};
@@ -125,7 +128,11 @@ pub struct PerTriangle {
 pub struct LedgerEntry {
     pub treatment: Treatment,
     pub feature: String,
+    /// How often.
     pub count: u64,
+    /// What of the scene it concerns.
+    #[serde(flatten)]
+    pub reach: Reach,
 }
 
 /// What building took.
@@ -149,7 +156,7 @@ pub fn run(arguments: &InfoArguments) -> Result<()> {
     let loaded = formats::open(&arguments.input, &arguments.load.options(), &terminal);
     terminal.clear();
     let Loaded { scene, ledger, .. } = loaded?;
-    ledger::report(&ledger, false);
+    ledger::report(&arguments.input, &ledger, &scene, Told::Warnings, arguments.load.strict)?;
     let mut info = Info::of(&arguments.input, &scene, &ledger);
     if arguments.tree || arguments.validate {
         let renderer = arguments.build.params(&scene, 0).and_then(|params| Renderer::build(scene, &params, &terminal));
@@ -181,8 +188,13 @@ impl<'a> Info<'a> {
             height: texture.height,
         };
         let light = |light: &crate::scene::Light| LightInfo { name: light.name.clone(), kind: light_kind(&light.kind) };
-        let entry =
-            |(treatment, feature, count): (_, &str, _)| LedgerEntry { treatment, feature: feature.into(), count };
+        let census = Census::of(scene);
+        let entry = |(treatment, feature, entry): (_, &str, &Entry)| LedgerEntry {
+            treatment,
+            feature: feature.into(),
+            count: entry.count,
+            reach: census.reach(entry, None),
+        };
         Self {
             schema: SCHEMA,
             input,
@@ -203,7 +215,7 @@ impl<'a> Info<'a> {
             needs: Needs::of(scene),
             bytes,
             bytes_per_triangle: bytes.per_triangle(all_triangles),
-            ledger: ledger.entries().map(entry).collect(),
+            ledger: ledger.all().map(entry).collect(),
             tree: None,
         }
     }

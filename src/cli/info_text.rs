@@ -23,7 +23,7 @@ pub fn of(info: &Info<'_>) -> String {
     if !info.ledger.is_empty() {
         table.heading("read");
         for entry in &info.ledger {
-            table.line(&format!("  {}", ledger::line(entry.treatment, &entry.feature, entry.count)));
+            table.line(&format!("  {}", ledger::line(entry.treatment, &entry.feature, entry.count, Some(entry.reach))));
         }
     }
     table.0

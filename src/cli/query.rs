@@ -8,7 +8,7 @@ use clap::{Args, ValueHint};
 use rayon::prelude::*;
 
 use super::arguments::{BuildArguments, LoadArguments};
-use super::ledger;
+use super::ledger::{self, Told};
 use super::outputs::refuse_inputs;
 use super::stream::Stream;
 use super::terminal::Terminal;
@@ -114,7 +114,7 @@ pub fn run(arguments: &QueryArguments) -> Result<()> {
     let loaded = formats::open(&arguments.input, &options, &terminal);
     terminal.clear();
     let Loaded { scene, ledger, .. } = loaded?;
-    ledger::report(&ledger, false);
+    ledger::report(&arguments.input, &ledger, &scene, Told::Warnings, arguments.load.strict)?;
     if let Some(path) = to_file {
         refuse_inputs(path, ledger.files())?;
     }

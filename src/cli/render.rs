@@ -4,12 +4,13 @@ use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 use super::arguments::RenderArguments;
+use super::ledger::{self, Told};
 use super::memory_limit::picture_bytes;
 use super::outputs::{Outputs, Picture};
 use super::precision::{AnyRenderer, Precision};
 use super::stats_json::{Bytes, SCHEMA, Seconds, Settings, Stats, timed};
 use super::terminal::{self, Terminal};
-use super::{camera, ledger, outputs};
+use super::{camera, outputs};
 use crate::error::{Error, Result};
 use crate::formats::{self, picture};
 use crate::progress::Progress;
@@ -41,9 +42,12 @@ pub fn run(arguments: &RenderArguments) -> Result<()> {
     (loaded, seconds.load) = timed(|| formats::open(&arguments.input, &options, &terminal));
     terminal.clear();
     let formats::Loaded { mut scene, ledger, automatic } = loaded?;
-    if !arguments.quiet {
-        ledger::report(&ledger, arguments.verbose);
-    }
+    let told = match (arguments.quiet, arguments.verbose) {
+        (true, _) => Told::Nothing,
+        (_, true) => Told::Everything,
+        _ => Told::Warnings,
+    };
+    ledger::report(&arguments.input, &ledger, &scene, told, arguments.load.strict)?;
     outputs.refuse_inputs(ledger.files())?;
     report_time("load", seconds.load);
     terminal.check()?;

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueHint};
 
 use super::commit::commit;
+use super::ledger::Told;
 use super::query::FORMATS;
 use super::ray_input::{MOST_RAYS, read_rays, stem};
 use super::terminal::{self, Terminal};
@@ -183,7 +184,7 @@ impl Part<'_> {
                 let loaded = formats::open(path, &arguments.load.options(), terminal);
                 terminal.clear();
                 let Loaded { scene, ledger, .. } = loaded?;
-                ledger::report(&ledger, false);
+                ledger::report(path, &ledger, &scene, Told::Warnings, arguments.load.strict)?;
                 Subject::of_scene(stem(path), scene).map_err(|error| error.at_path(path))
             }
         }

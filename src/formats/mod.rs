@@ -8,6 +8,7 @@ pub mod limits;
 pub mod model;
 pub mod obj;
 pub mod picture;
+pub mod reach;
 mod rounding;
 pub mod scene_file;
 
