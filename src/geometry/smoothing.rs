@@ -164,7 +164,8 @@ fn fans(mesh: &TriangleMesh, least: f64) -> Vec<u32> {
         if let (Some(normal_a), Some(normal_b)) = (normal(a), normal(b))
             && dot(normal_a, normal_b) > least
         {
-            let ends = |corner| if place(corner) == Some(low) { (corner, next(corner)) } else { (next(corner), corner) };
+            let ends =
+                |corner| if place(corner) == Some(low) { (corner, next(corner)) } else { (next(corner), corner) };
             let ((low_a, high_a), (low_b, high_b)) = (ends(a), ends(b));
             fans.join(low_a, low_b);
             fans.join(high_a, high_b);
