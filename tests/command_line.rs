@@ -461,6 +461,7 @@ fn info_is_readable_and_its_json_is_stable() {
         "triangles.dropped.zero_area",
         "triangles.dropped.bad_index",
         "meshes",
+        "groups",
         "instances",
         "quadrics",
         "materials",

@@ -1,8 +1,12 @@
-//! How much memory building the default structure and the compact one takes at its peak, beside the mesh: measured, on Linux, in a process of its own.
+//! How much memory it takes at its peak to build the default structure and the compact one, beside the mesh, and to load a model:
+//! measured, on Linux, in a process of its own.
 
+use std::io::{BufWriter, Write as _};
+use std::path::Path;
 use std::sync::Arc;
 
 use whitted::accel::{Compact, Params, TriangleAccelerator, Wide};
+use whitted::formats::{LoadOptions, load_model};
 use whitted::geometry::TriangleMesh;
 use whitted::glam::Vec3;
 use whitted::progress::Silent;
@@ -95,6 +99,96 @@ fn a_build_takes_little_more_than_what_it_makes() {
     both(724);
     if std::env::var_os("WHITTED_FULL_TESTS").is_some() {
         both(2237);
+    } else {
+        eprintln!("skipped: 10 million triangles; set WHITTED_FULL_TESTS for them");
+    }
+}
+
+/// Writes hills of `2 side^2` triangles as an OBJ file: positions and faces alone, in a smoothing group, or with texture
+/// coordinates and normals.
+fn write_hills(path: &Path, side: u32, kind: &str) {
+    let mut file = BufWriter::new(std::fs::File::create(path).unwrap());
+    let at = |i: u32| f64::from(i) / f64::from(side);
+    let vertices = || (0..=side).flat_map(|j| (0..=side).map(move |i| (i, j)));
+    for (i, j) in vertices() {
+        let height = 0.1 * libm::sin(9.0 * at(i)) * libm::sin(7.0 * at(j));
+        writeln!(file, "v {:.6} {height:.6} {:.6}", at(i), at(j)).unwrap();
+    }
+    if kind == "full" {
+        for (i, j) in vertices() {
+            writeln!(file, "vt {:.6} {:.6}\nvn 0 1 {:.3}", at(i), at(j), at(i)).unwrap();
+        }
+    }
+    if kind == "smooth" {
+        writeln!(file, "s 1").unwrap();
+    }
+    let corner = |i: u32, j: u32| {
+        let n = j * (side + 1) + i + 1;
+        if kind == "full" { format!("{n}/{n}/{n}") } else { n.to_string() }
+    };
+    for (j, i) in (0..side).flat_map(|j| (0..side).map(move |i| (j, i))) {
+        let [a, b, c, d] = [corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)];
+        if kind == "quads" {
+            writeln!(file, "f {a} {d} {c} {b}").unwrap();
+        } else {
+            writeln!(file, "f {a} {c} {b}\nf {a} {d} {c}").unwrap();
+        }
+    }
+}
+
+/// Loads in this process, in which nothing else runs, and prints what it took.
+#[test]
+#[ignore = "asked for by the test below, in a process of its own"]
+fn load_alone() {
+    let path = std::env::var(FILE).unwrap();
+    // What is loaded once, such as the code itself, is no part of what a model takes.
+    let small = Path::new(&path).with_file_name("small.obj");
+    write_hills(&small, 4, "full");
+    drop(load_model(&small, &LoadOptions::default(), &Silent).unwrap());
+    let measured = std::fs::write("/proc/self/clear_refs", "5").ok().and_then(|()| status("VmRSS"));
+    let model = load_model(Path::new(&path), &LoadOptions::default(), &Silent).unwrap();
+    let end: usize = model.meshes.iter().map(TriangleMesh::bytes).sum();
+    match (measured, status("VmHWM")) {
+        (Some(before), Some(peak)) => println!("{PREFIX}{} {end}", peak.saturating_sub(before)),
+        _ => println!("{PREFIX}"),
+    }
+}
+
+const FILE: &str = "WHITTED_TEST_FILE";
+
+/// The peak of loading is at most twice what there is in the end, and 4 MiB for buffers and a stack of threads.
+fn check_load(side: u32, kind: &str) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("hills.obj");
+    write_hills(&path, side, kind);
+    let output = std::process::Command::new(std::env::current_exe().unwrap())
+        .args(["memory::load_alone", "--exact", "--ignored", "--nocapture"])
+        .env(FILE, &path)
+        .env("RAYON_NUM_THREADS", "2")
+        .output()
+        .unwrap();
+    let text = String::from_utf8_lossy(&output.stdout);
+    let line = text.lines().find_map(|line| Some(line.split_once(PREFIX)?.1)).unwrap_or_else(|| panic!("{text}"));
+    let numbers: Vec<f64> = line.split_whitespace().map(|number| number.parse().unwrap()).collect();
+    let [peak, end] = numbers[..] else {
+        eprintln!("skipped: this system does not tell how much memory a process takes");
+        return;
+    };
+    let triangles = f64::from(2 * side * side);
+    println!(
+        "{kind}, {triangles} triangles: {:.1} bytes each in the end, {:.1} at the peak",
+        end / triangles,
+        peak / triangles
+    );
+    assert!(peak < 2.0 * end + f64::from(4 << 20), "{kind}: {peak} bytes at the peak, {end} in the end");
+}
+
+#[test]
+fn loading_an_obj_file_takes_at_most_twice_what_it_makes() {
+    let all = |side: u32| ["plain", "quads", "smooth", "full"].into_iter().for_each(|kind| check_load(side, kind));
+    all(724);
+    if std::env::var_os("WHITTED_FULL_TESTS").is_some() {
+        all(2237);
     } else {
         eprintln!("skipped: 10 million triangles; set WHITTED_FULL_TESTS for them");
     }

@@ -33,6 +33,8 @@ pub struct Info<'a> {
     pub files: Vec<&'a Path>,
     pub triangles: Triangles,
     pub meshes: usize,
+    /// Names that the file gives to consecutive triangles of a mesh, in order.
+    pub groups: Vec<GroupInfo>,
     pub instances: usize,
     pub quadrics: usize,
     pub materials: Vec<String>,
@@ -66,6 +68,17 @@ pub struct Triangles {
     pub instanced: u64,
     /// That cannot be hit, by reason, every mesh counted once.
     pub dropped: DroppedCounts,
+}
+
+/// Consecutive triangles with a name.
+#[derive(Debug, Serialize)]
+pub struct GroupInfo {
+    pub name: String,
+    /// The mesh, by its position among all.
+    pub mesh: usize,
+    pub first_triangle: u32,
+    /// How many, dropped ones included.
+    pub triangles: u32,
 }
 
 /// One image.
@@ -201,6 +214,7 @@ impl<'a> Info<'a> {
             files: ledger.files().collect(),
             triangles: Triangles { unique: live_triangles(scene), instanced: scene.instanced_triangles(), dropped },
             meshes: scene.meshes.len(),
+            groups: groups(scene),
             instances: scene.objects.len(),
             quadrics: scene.quadrics.len(),
             materials: used_names(scene),
@@ -304,6 +318,20 @@ fn rounding(scene: &Scene) -> Option<RoundingInfo> {
     Some(RoundingInfo { mesh: worst.name.clone(), coordinate_loss: largest_loss, finest_edge })
 }
 
+/// The names within all meshes.
+fn groups(scene: &Scene) -> Vec<GroupInfo> {
+    let mut groups = Vec::new();
+    for (mesh, own) in scene.meshes.iter().enumerate() {
+        groups.extend(own.named_runs().map(|(name, first_triangle, triangles)| GroupInfo {
+            name: name.to_owned(),
+            mesh,
+            first_triangle,
+            triangles,
+        }));
+    }
+    groups
+}
+
 /// The names of the materials in use.
 fn used_names(scene: &Scene) -> Vec<String> {
     let used = scene.used_materials();
@@ -313,6 +341,7 @@ fn used_names(scene: &Scene) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::mesh::Group;
     use crate::geometry::shapes;
     use crate::scene::{NamedCamera, Object, Shape, auto};
     use glam::{DAffine3, Vec3};
@@ -358,6 +387,17 @@ mod tests {
     fn bounds_are_those_of_the_file_and_of_every_instance() {
         let bounds = bounds(&scene()).unwrap();
         assert_eq!((bounds.min, bounds.max), ([-3.0, -3.0, -3.0], [101.0, 3.0, 7.0]));
+    }
+
+    #[test]
+    fn groups_tell_their_mesh_and_their_triangles() {
+        let group = |name: &str, first_triangle| Group { name: name.into(), first_triangle };
+        let mut scene = scene();
+        let mesh = TriangleMesh { groups: vec![group("a", 0), group("b", 1)], ..(*scene.meshes[0]).clone() };
+        scene.meshes.push(mesh.into());
+        let groups = groups(&scene);
+        let found: Vec<_> = groups.iter().map(|g| (g.name.as_str(), g.mesh, g.first_triangle, g.triangles)).collect();
+        assert_eq!(found, [("a", 1, 0, 1), ("b", 1, 1, 1)]);
     }
 
     #[test]

@@ -9,6 +9,9 @@ use super::terminal::printable;
 /// Width of the column of names.
 const LABEL: usize = 22;
 
+/// Names of groups that are printed; files may have one for each face.
+const MOST_GROUPS: usize = 40;
+
 /// The whole text.
 pub fn of(info: &Info<'_>) -> String {
     let mut table = Table(String::new());
@@ -48,6 +51,10 @@ fn contents(table: &mut Table, info: &Info<'_>) {
         }
     }
     table.row("meshes", info.meshes);
+    if !info.groups.is_empty() {
+        let names: Vec<String> = info.groups.iter().take(MOST_GROUPS).map(|group| group.name.clone()).collect();
+        table.list_of("groups", info.groups.len(), &names);
+    }
     table.row("quadrics", info.quadrics);
     table.row("instances", info.instances);
     table.list("materials", &info.materials);
@@ -148,7 +155,12 @@ impl Table {
 
     /// A number of things, and one name a line below it; a name that several have comes once.
     fn list(&mut self, label: &str, names: &[String]) {
-        self.row(label, names.len());
+        self.list_of(label, names.len(), names);
+    }
+
+    /// The same of the first of so many.
+    fn list_of(&mut self, label: &str, count: usize, names: &[String]) {
+        self.row(label, count);
         let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
         for name in names {
             *counts.entry(name).or_default() += 1;
@@ -159,6 +171,9 @@ impl Table {
                 Some(count) => self.line(&format!("  {:LABEL$}   {name} ({count} of them)", "")),
                 None => {}
             }
+        }
+        if names.len() < count {
+            self.line(&format!("  {:LABEL$}   and {} more, all of them with --json", "", count - names.len()));
         }
     }
 
@@ -224,5 +239,8 @@ mod tests {
         table.list("materials", &["wood", "glass", "wood"].map(String::from));
         let words: Vec<_> = table.0.split_whitespace().collect();
         assert_eq!(words, ["materials", "3", "wood", "(2", "of", "them)", "glass"]);
+        let mut table = Table(String::new());
+        table.list_of("groups", 5, &["a", "b"].map(String::from));
+        assert!(table.0.contains(" and 3 more"), "{}", table.0);
     }
 }

@@ -1,5 +1,7 @@
 //! Triangle meshes: shared vertex arrays, and which triangles can be hit at all.
 
+use std::sync::Arc;
+
 use glam::{DVec3, Vec2, Vec3, Vec4};
 use robust::{Coord, orient2d};
 
@@ -38,6 +40,9 @@ pub struct TriangleMesh {
     pub tangents: Option<Vec<Vec4>>,
     /// Which of the scene's materials each triangle has.
     pub materials: Materials,
+    /// Names of runs of triangles, ascending: each group reaches to the next one's first triangle. Empty where the file names
+    /// nothing within a mesh.
+    pub groups: Vec<Group>,
     /// The 0-based face of the file that each triangle was cut from, where that was asked for and faces are not
     /// triangles anyway; see [`source_face`](Self::source_face).
     pub source_faces: Option<Vec<u32>>,
@@ -47,6 +52,15 @@ pub struct TriangleMesh {
     pub dropped_counts: DroppedCounts,
     /// What storing the file's positions in f32 cost; filled by loaders.
     pub rounding: Rounding,
+}
+
+/// A name that the file gives to consecutive triangles.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Group {
+    /// Object and group, with a slash between where the file has both.
+    pub name: Arc<str>,
+    /// The first of them.
+    pub first_triangle: u32,
 }
 
 /// What storing a file's positions in f32 cost, in the file's units.
@@ -293,7 +307,16 @@ impl TriangleMesh {
         Ok(number)
     }
 
-    /// Bytes of the vertex and index arrays and attributes.
+    /// The names of runs of triangles: name, first triangle and number of triangles.
+    pub fn named_runs(&self) -> impl Iterator<Item = (&str, u32, u32)> {
+        let ends = self.groups.iter().skip(1).map(|next| next.first_triangle).chain([self.indices.len() as u32]);
+        self.groups
+            .iter()
+            .zip(ends)
+            .map(|(group, end)| (&*group.name, group.first_triangle, end - group.first_triangle))
+    }
+
+    /// Bytes of the vertex and index arrays and attributes; of names, what lists them.
     pub fn bytes(&self) -> usize {
         let per_triangle = match &self.materials {
             Materials::One(_) => 0,
@@ -307,6 +330,7 @@ impl TriangleMesh {
             + self.colors.as_ref().map_or(0, |colors| std::mem::size_of_val(colors.as_slice()))
             + self.tangents.as_ref().map_or(0, |tangents| std::mem::size_of_val(tangents.as_slice()))
             + std::mem::size_of_val(self.dropped.as_slice())
+            + std::mem::size_of_val(self.groups.as_slice())
             + per_triangle
     }
 }

@@ -17,10 +17,20 @@ use crate::formats::{Ledger, Treatment};
 /// The materials of all libraries that a file names.
 #[derive(Default)]
 pub(super) struct Libraries {
-    /// By name, with the folder of the library; the first definition counts.
-    materials: HashMap<String, (tobj::Material, PathBuf)>,
+    /// By name; the first definition counts.
+    definitions: HashMap<String, Definition>,
     /// Whether a library could not be found or read: then names that are not defined are no news.
     pub incomplete: bool,
+}
+
+/// A material as a library defines it.
+pub(super) struct Definition {
+    /// What tobj made of its statements.
+    pub source: tobj::Material,
+    /// The folder that its images are relative to.
+    pub folder: PathBuf,
+    /// What became of each statement.
+    pub statements: Vec<(Treatment, String)>,
 }
 
 impl Libraries {
@@ -48,20 +58,22 @@ impl Libraries {
         libraries
     }
 
-    /// The material of this name, and the folder that its images are relative to.
-    pub fn get(&self, name: &str) -> Option<(&tobj::Material, &Path)> {
-        self.materials.get(name).map(|(material, folder)| (material, folder.as_path()))
+    /// The material of this name.
+    pub fn get(&self, name: &str) -> Option<&Definition> {
+        self.definitions.get(name)
     }
 
     fn read_file(&mut self, path: &Path, ledger: &mut Ledger) -> Result<()> {
         ledger.note_file(path);
         let file = File::open(path).map_err(|cause| Error::system(path, cause))?;
-        let text = clean(path, BufReader::new(file), ledger)?;
+        let (text, statements) = clean(path, BufReader::new(file), ledger)?;
         let (materials, _) =
             tobj::load_mtl_buf(&mut text.as_bytes()).map_err(|cause| Error::file(cause.to_string()).at_path(path))?;
         let folder = path.parent().unwrap_or(Path::new(""));
-        for material in materials {
-            self.materials.entry(material.name.clone()).or_insert_with(|| (material, folder.to_path_buf()));
+        for (source, statements) in materials.into_iter().zip(statements) {
+            let name = source.name.clone();
+            let definition = || Definition { source, folder: folder.to_path_buf(), statements };
+            self.definitions.entry(name).or_insert_with(definition);
         }
         Ok(())
     }
@@ -82,26 +94,38 @@ fn split_names(names: &str) -> Vec<&str> {
     starts.zip(&ends).map(|(start, &end)| names[start..end].trim()).collect()
 }
 
-/// The statements that tobj shall read, each checked, in the spelling that it knows.
-fn clean(path: &Path, reader: impl BufRead, ledger: &mut Ledger) -> Result<String> {
+/// The statements that tobj shall read, each checked, in the spelling that it knows, and for each material what became of
+/// its statements.
+fn clean(path: &Path, reader: impl BufRead, ledger: &mut Ledger) -> Result<(String, Vec<Vec<(Treatment, String)>>)> {
     let mut lines = Lines::new(path, reader);
     let mut text = String::new();
+    let mut materials: Vec<Vec<(Treatment, String)>> = Vec::new();
     while let Some(statement) = lines.read()? {
-        match clean_statement(statement) {
+        let cleaned = clean_statement(statement);
+        let outcome = match cleaned {
+            Ok(Cleaned::Use("newmtl", name)) => {
+                text += &format!("newmtl {name}\n");
+                materials.push(Vec::new());
+                continue;
+            }
+            Ok(_) if materials.is_empty() => Err(Error::file("a statement before the first newmtl")),
             Ok(Cleaned::Use(keyword, value)) => {
                 text += &format!("{keyword} {value}\n");
-                if keyword != "newmtl" {
-                    ledger.note(Treatment::Honoured, format!("MTL {keyword}"), 1);
-                }
+                Ok((Treatment::Honoured, format!("MTL {keyword}")))
             }
-            Ok(Cleaned::LeaveOut(feature)) => ledger.note(Treatment::Ignored, feature, 1),
-            Err(error) => {
+            Ok(Cleaned::LeaveOut(feature)) => Ok((Treatment::Ignored, feature)),
+            Err(error) => Err(error),
+        };
+        match (outcome, materials.last_mut()) {
+            (Ok(note), Some(material)) => material.push(note),
+            (Ok(_), None) => {}
+            (Err(error), _) => {
                 let error = error.at_path(path).at_line(statement.line);
                 ledger.note(Treatment::Warning, format!("{error}: left out"), 1);
             }
         }
     }
-    Ok(text)
+    Ok((text, materials))
 }
 
 enum Cleaned {
@@ -109,10 +133,31 @@ enum Cleaned {
     LeaveOut(String),
 }
 
+/// Statements that name an image, by their keyword in lower case, in the spelling in which they are read.
+const MAPS: [(&str, &str); 9] = [
+    ("map_kd", "map_Kd"),
+    ("map_ks", "map_Ks"),
+    ("map_ke", "map_Ke"),
+    ("map_d", "map_d"),
+    ("map_bump", "map_Bump"),
+    ("bump", "map_Bump"),
+    ("norm", "norm"),
+    ("map_pr", "map_Pr"),
+    ("map_pm", "map_Pm"),
+];
+
 fn clean_statement(Statement { keyword, rest, .. }: Statement<'_>) -> Result<Cleaned> {
     let number = |keyword, word: Option<&str>| Ok(Cleaned::Use(keyword, finite(word)?.to_string()));
     let first = rest.split_ascii_whitespace().next();
-    match keyword.to_ascii_lowercase().as_str() {
+    let lower = keyword.to_ascii_lowercase();
+    if let Some(&(_, map)) = MAPS.iter().find(|map| map.0 == lower) {
+        return if rest.is_empty() {
+            Err(Error::file(format!("{map} without a file")))
+        } else {
+            Ok(Cleaned::Use(map, rest.to_owned()))
+        };
+    }
+    match lower.as_str() {
         "newmtl" if rest.is_empty() => Err(Error::file("a material without a name")),
         "newmtl" => Ok(Cleaned::Use("newmtl", rest.to_owned())),
         "kd" => color("Kd", rest),
@@ -121,6 +166,8 @@ fn clean_statement(Statement { keyword, rest, .. }: Statement<'_>) -> Result<Cle
         "tf" | "kt" => color("Tf", rest),
         "ns" => number("Ns", first),
         "ni" => number("Ni", first),
+        "pr" => number("Pr", first),
+        "pm" => number("Pm", first),
         // `d -halo 0.5`: the number comes last.
         "d" => number("d", rest.split_ascii_whitespace().next_back()),
         "tr" => number("Tr", first),
@@ -131,9 +178,8 @@ fn clean_statement(Statement { keyword, rest, .. }: Statement<'_>) -> Result<Cle
             }
             Ok(Cleaned::Use("illum", model.to_string()))
         }
-        "map_kd" if rest.is_empty() => Err(Error::file("map_Kd without a file")),
-        "map_kd" => Ok(Cleaned::Use("map_Kd", rest.to_owned())),
-        "ka" => Ok(Cleaned::LeaveOut("Ka: ambient comes from the scene".into())),
+        "ka" | "map_ka" => Ok(Cleaned::LeaveOut(format!("MTL {keyword}: ambient comes from the scene"))),
+        "map_tr" => Ok(Cleaned::LeaveOut("MTL map_Tr: exporters disagree whether white is opaque; use map_d".into())),
         _ => Ok(Cleaned::LeaveOut(format!("MTL {}", keyword.chars().take(40).collect::<String>()))),
     }
 }
@@ -149,12 +195,11 @@ fn color(keyword: &'static str, rest: &str) -> Result<Cleaned> {
     Ok(Cleaned::Use(keyword, format!("{r} {g} {b}")))
 }
 
+/// A finite number, read in f64 and then rounded.
 fn finite(word: Option<&str>) -> Result<f32> {
     let word = word.ok_or_else(|| Error::file("a number is missing"))?;
-    word.parse()
-        .ok()
-        .filter(|x: &f32| x.is_finite())
-        .ok_or_else(|| Error::file(format!("`{}` is not a number", word.chars().take(40).collect::<String>())))
+    let number = word.parse::<f64>().ok().map(|number| number as f32).filter(|number| number.is_finite());
+    number.ok_or_else(|| Error::file(format!("`{}` is not a number", word.chars().take(40).collect::<String>())))
 }
 
 #[cfg(test)]
@@ -166,8 +211,12 @@ mod tests {
         std::fs::write(folder.path().join("a.mtl"), text).unwrap();
         let mut ledger = Ledger::default();
         let libraries = Libraries::read(folder.path(), &[("a.mtl".into(), 1)], &mut ledger);
-        let notes = ledger.entries().filter(|entry| entry.0 != Treatment::Honoured);
-        (libraries, notes.map(|(_, feature, _)| feature.replace(folder.path().to_str().unwrap(), "")).collect())
+        let ignored =
+            |(treatment, text): &(Treatment, String)| (*treatment == Treatment::Ignored).then(|| text.clone());
+        let of_a = libraries.get("a").into_iter().flat_map(|definition| &definition.statements).filter_map(ignored);
+        let warnings = ledger.entries().map(|(_, feature, _)| feature.replace(folder.path().to_str().unwrap(), ""));
+        let notes = of_a.chain(warnings).collect();
+        (libraries, notes)
     }
 
     #[test]
@@ -176,7 +225,7 @@ mod tests {
             "newmtl a b\r\n\tKD 1 0.5 .25 # c\r\nKs 0.5\nNs 1e2\nd -halo 0.5\nillum 7\nTf 1 0 0\nmap_kd -s 2 2 a b.png\n",
         );
         assert_eq!(notes, [""; 0]);
-        let material = libraries.get("a b").unwrap().0;
+        let material = &libraries.get("a b").unwrap().source;
         assert_eq!(material.diffuse, Some([1.0, 0.5, 0.25]));
         assert_eq!(material.specular, Some([0.5; 3]));
         assert_eq!(material.shininess, Some(100.0));
@@ -189,15 +238,16 @@ mod tests {
     #[test]
     fn trouble_is_a_warning_with_its_line_and_the_rest_is_read() {
         let (libraries, notes) = read(
-            "newmtl a\nKd 1 0\nKs x 0 0\nillum 2.5\nNs nan\nnewmtl\nmap_Kd\nKa 1 1 1\nPr 1\nKe spectral a 1\nKd 1 1 1",
+            "newmtl a\nKd 1 0\nKs x 0 0\nillum 2.5\nNs nan\nnewmtl\nmap_Kd\nKa 1 1 1\nPc 1\nKe spectral a 1\nmap_tr x\nKd 1 1 1",
         );
-        assert_eq!(libraries.get("a").unwrap().0.diffuse, Some([1.0; 3]));
+        assert_eq!(libraries.get("a").unwrap().source.diffuse, Some([1.0; 3]));
         assert_eq!(
             notes,
             [
-                "Ka: ambient comes from the scene",
+                "MTL Ka: ambient comes from the scene",
+                "MTL Pc",
                 "MTL Ke spectral",
-                "MTL Pr",
+                "MTL map_Tr: exporters disagree whether white is opaque; use map_d",
                 "/a.mtl:2: a number is missing: left out",
                 "/a.mtl:3: `x` is not a number: left out",
                 "/a.mtl:4: `2.5` is not an illumination model from 0 to 10: left out",
@@ -206,6 +256,14 @@ mod tests {
                 "/a.mtl:7: map_Kd without a file: left out",
             ]
         );
+    }
+
+    #[test]
+    fn statements_before_the_first_material_are_warned_of() {
+        let (libraries, notes) = read("Kd 1 1 1\nnewmtl a\nKd 0.1 0.2 0.3\n");
+        assert_eq!(notes, ["/a.mtl:1: a statement before the first newmtl: left out"]);
+        // 0.1 as the nearest f32 to the f64, which is what the f32 reader of tobj gives as well.
+        assert_eq!(libraries.get("a").unwrap().source.diffuse, Some([0.1, 0.2, 0.3]));
     }
 
     #[test]
@@ -219,6 +277,6 @@ mod tests {
     #[test]
     fn the_first_definition_counts() {
         let (libraries, _) = read("newmtl a\nKd 1 1 1\nnewmtl a\nKd 0 0 0\n");
-        assert_eq!(libraries.get("a").unwrap().0.diffuse, Some([1.0; 3]));
+        assert_eq!(libraries.get("a").unwrap().source.diffuse, Some([1.0; 3]));
     }
 }

@@ -3,12 +3,13 @@
 use std::collections::HashMap;
 use std::iter::repeat_n;
 
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec3, Vec3};
 
+use super::colors;
 use super::parse::{ABSENT, Parsed};
 use super::triangulate::Triangulator;
 use crate::error::Result;
-use crate::formats::{LoadOptions, NormalMode, rounding};
+use crate::formats::{Ledger, LoadOptions, NormalMode, Treatment, rounding};
 use crate::geometry::TriangleMesh;
 use crate::geometry::mesh::{Materials, Rounding};
 use crate::math::origin::choose_origin;
@@ -20,145 +21,173 @@ const FACES_PER_CHECK: usize = 1 << 16;
 /// The whole file as one mesh, finished, and the names of its materials in the order in which faces first use them;
 /// `None` is the material of faces before any `usemtl`.
 ///
+/// What was read is let go piece by piece, so that no more memory is taken than twice that of the mesh.
+///
 /// # Errors
-/// A limit for more triangles than 32 bits count; cancellation.
+/// A limit for more triangles or vertices than 32 bits count; cancellation.
 pub(super) fn build(
     mut parsed: Parsed,
     name: &str,
     options: &LoadOptions,
     progress: &dyn Progress,
+    ledger: &mut Ledger,
 ) -> Result<(TriangleMesh, Vec<Option<String>>)> {
-    let normals = options.normals;
-    if normals != NormalMode::File {
-        // Corners that differ in their normal alone are then one vertex.
-        parsed.faces.normals = Vec::new();
-    }
-    let used = used_positions(&parsed);
-    let used_positions = || parsed.positions.iter().zip(&used).filter_map(|(&p, &used)| used.then_some(p));
-    let origin = choose_origin(used_positions());
+    let origin = choose_origin(used_positions(&parsed));
     let rounding = Rounding {
-        largest_loss: rounding::largest_loss(used_positions(), origin),
-        finest_edge: rounding::finest_edge(edges(&parsed), rounding::magnitude(used_positions())),
+        largest_loss: rounding::largest_loss(used_positions(&parsed), origin),
+        finest_edge: rounding::finest_edge(edges(&parsed), rounding::magnitude(used_positions(&parsed))),
     };
-    drop(used);
-    let vertices = unify(&parsed, origin);
-    let indices = cut(&parsed, vertices.of_corners.as_deref().unwrap_or(&parsed.faces.positions), progress)?;
     let (names, materials) = materials(&parsed);
-    let Vertices { positions, uvs, normals: file_normals, .. } = vertices;
+    let groups = parsed.names.groups(parsed.faces.corner_counts());
+    let smoothing = smoothing_runs(&parsed);
+    let source_faces = options.faces.then(|| source_faces(&parsed));
+    let indices = cut(&mut parsed, progress)?;
     let mesh = TriangleMesh {
         name: name.to_owned(),
         origin,
-        positions,
         indices,
-        normals: file_normals,
-        uvs,
         materials,
+        groups,
+        source_faces,
         rounding,
-        source_faces: options.faces.then(|| source_faces(&parsed)),
-        ..Default::default()
+        ..with_vertices(parsed, origin, ledger)
     };
-    drop(parsed);
     let mut mesh = mesh.finish()?;
-    if normals == NormalMode::Smooth {
-        mesh.compute_normals();
+    match options.normals {
+        NormalMode::File => smooth(&mut mesh, smoothing.as_deref(), options.crease_angle, ledger)?,
+        NormalMode::Flat => {}
+        NormalMode::Smooth => mesh.compute_normals(),
     }
     Ok((mesh, names))
 }
 
-/// Which positions some corner refers to. Others, such as a stray point at zero beside a model in map coordinates, must
+/// Gives normals to vertices that lack them: by the file's smoothing groups, or, where a file has neither normals nor groups,
+/// up to the crease angle.
+fn smooth(
+    mesh: &mut TriangleMesh,
+    groups: Option<&[(u32, u32)]>,
+    angle: Option<f64>,
+    ledger: &mut Ledger,
+) -> Result<()> {
+    let lacks_normals = mesh.normals.as_ref().is_none_or(|normals| normals.contains(&Vec3::ZERO));
+    match (groups, angle) {
+        (Some(groups), _) if lacks_normals && groups.iter().any(|&(_, group)| group != 0) => mesh.smooth_groups(groups),
+        (None, Some(angle)) if mesh.normals.is_none() => {
+            ledger.note(Treatment::Honoured, "crease angle: edges below it are smooth", 1);
+            mesh.smooth_creases(angle)
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The positions that some corner refers to. Others, such as a stray point at zero beside a model in map coordinates, must
 /// not decide where the origin is.
-fn used_positions(parsed: &Parsed) -> Vec<bool> {
+fn used_positions(parsed: &Parsed) -> impl Iterator<Item = DVec3> + '_ {
     let mut used = vec![false; parsed.positions.len()];
-    for &number in &parsed.faces.positions {
+    for number in parsed.faces.positions() {
         if let Some(used) = used.get_mut(number as usize) {
             *used = true;
         }
     }
-    used
+    parsed.positions.iter().zip(used).filter_map(|(&p, used)| used.then_some(p))
 }
 
 /// The ends of every face's edges; NaN where a corner's vertex is not in the file.
 fn edges(parsed: &Parsed) -> impl Iterator<Item = (DVec3, DVec3)> + '_ {
     let mut start = 0;
     parsed.faces.corner_counts().flat_map(move |count| {
-        let corners = &parsed.faces.positions[start..start + count];
+        let corners = &parsed.faces.corners()[start..start + count];
         start += count;
-        let point = |number: u32| parsed.positions.get(number as usize).copied().unwrap_or(DVec3::NAN);
         let next = corners.iter().cycle().skip(1);
-        corners.iter().zip(next).map(move |(&a, &b)| (point(a), point(b)))
+        corners.iter().zip(next).map(move |(&a, &b)| (point(parsed, a), point(parsed, b)))
     })
 }
 
-/// The mesh's vertices, and which of them each corner is.
-struct Vertices {
-    positions: Vec<Vec3>,
-    uvs: Option<Vec<Vec2>>,
-    normals: Option<Vec<Vec3>>,
-    /// `None`: a corner's position number is its vertex number.
-    of_corners: Option<Vec<u32>>,
+/// Where a vertex is; NaN where that is not in the file.
+fn point(parsed: &Parsed, vertex: u32) -> DVec3 {
+    parsed.positions.get(parsed.faces.position(vertex) as usize).copied().unwrap_or(DVec3::NAN)
 }
 
-/// Makes each combination of position, texture coordinate and normal that a corner has one vertex, in the order of
-/// the corners. Where corners have positions alone, the file's vertices are the mesh's.
-fn unify(parsed: &Parsed, origin: DVec3) -> Vertices {
-    let faces = &parsed.faces;
+/// A mesh of vertices alone, in the order in which corners first use them. Where corners have positions alone, the file's
+/// vertices are the mesh's. A position that is not in the file is NaN.
+fn with_vertices(parsed: Parsed, origin: DVec3, ledger: &mut Ledger) -> TriangleMesh {
+    let Parsed { positions, colors, uvs, normals, faces, .. } = parsed;
     let relative = |position: &DVec3| (*position - origin).as_vec3();
-    let has = |numbers: &[u32]| numbers.iter().any(|&number| number != ABSENT);
-    let (has_uvs, has_normals) = (has(&faces.uvs), has(&faces.normals));
-    if !has_uvs && !has_normals {
-        let positions = parsed.positions.iter().map(relative).collect();
-        return Vertices { positions, uvs: None, normals: None, of_corners: None };
-    }
-    let mut seen: HashMap<[u32; 3], u32> = HashMap::with_capacity(parsed.positions.len());
-    let (mut positions, mut uvs, mut normals) = (Vec::new(), Vec::new(), Vec::new());
-    let corner = |(corner, &position): (usize, &u32)| {
-        let Some(point) = parsed.positions.get(position as usize) else { return ABSENT };
-        let attribute = |numbers: &[u32]| numbers.get(corner).copied().unwrap_or(ABSENT);
-        let (uv, normal) = (attribute(&faces.uvs), attribute(&faces.normals));
-        *seen.entry([position, uv, normal]).or_insert_with(|| {
-            positions.push(relative(point));
-            if has_uvs {
-                uvs.push(parsed.uvs.get(uv as usize).copied().unwrap_or_default());
-            }
-            if has_normals {
-                normals.push(parsed.normals.get(normal as usize).copied().unwrap_or_default());
-            }
-            (positions.len() - 1) as u32
-        })
+    let colors = colors::linear(colors, ledger);
+    let Some(vertices) = faces.vertices() else {
+        let positions = positions.iter().map(relative).collect();
+        return TriangleMesh { positions, colors, ..Default::default() };
     };
-    let of_corners = faces.positions.iter().enumerate().map(corner).collect();
-    Vertices {
-        positions,
-        uvs: has_uvs.then_some(uvs),
-        normals: has_normals.then_some(normals),
-        of_corners: Some(of_corners),
+    drop(vertices);
+    let each = || faces.vertices().into_iter().flatten();
+    let mut mesh = TriangleMesh::default();
+    mesh.positions.reserve_exact(each().count());
+    mesh.positions.extend(each().map(|[position, ..]| positions.get(position as usize).map_or(Vec3::NAN, relative)));
+    drop(positions);
+    if each().any(|[_, uv, _]| uv != ABSENT) {
+        mesh.uvs = Some(each().map(|[_, uv, _]| uvs.get(uv as usize).copied().unwrap_or_default()).collect());
     }
+    drop(uvs);
+    if each().any(|[.., normal]| normal != ABSENT) {
+        mesh.normals = Some(each().map(|[.., n]| normals.get(n as usize).copied().unwrap_or_default()).collect());
+    }
+    drop(normals);
+    mesh.colors = colors.map(|colors| {
+        each().map(|[position, ..]| colors.get(position as usize).copied().unwrap_or(colors::WHITE)).collect()
+    });
+    mesh
 }
 
-/// Cuts the faces into triangles over the vertices that the corners are.
-fn cut(parsed: &Parsed, vertices: &[u32], progress: &dyn Progress) -> Result<Vec<[u32; 3]>> {
-    let mut triangles = Vec::with_capacity(parsed.faces.triangle_count());
+/// Cuts the faces into triangles over their vertices. Those that are not in the file become [`ABSENT`]; the corners are let
+/// go.
+fn cut(parsed: &mut Parsed, progress: &dyn Progress) -> Result<Vec<[u32; 3]>> {
+    progress.check()?;
+    let mut corners = parsed.faces.take_corners();
+    let is_outside = |vertex: &u32| parsed.faces.position(*vertex) as usize >= parsed.positions.len();
+    corners.iter_mut().filter(|vertex| is_outside(vertex)).for_each(|vertex| *vertex = ABSENT);
+    if corners.len() == 3 * parsed.faces.count() {
+        return Ok(in_threes(corners));
+    }
+    let mut triangles = Vec::with_capacity(corners.len() - 2 * parsed.faces.count());
     let mut triangulator = Triangulator::default();
     let mut points = Vec::new();
     let mut start = 0;
-    for (face, corners) in parsed.faces.corner_counts().enumerate() {
+    for (face, count) in parsed.faces.corner_counts().enumerate() {
         if face % FACES_PER_CHECK == 0 {
             progress.check()?;
         }
-        let range = start..start + corners;
-        let own = &vertices[range.clone()];
+        let own = &corners[start..start + count];
+        start += count;
         if let &[a, b, c] = own {
             triangles.push([a, b, c]);
-        } else {
-            let point = |&number: &u32| parsed.positions.get(number as usize).copied().unwrap_or(DVec3::NAN);
-            points.clear();
-            points.extend(parsed.faces.positions[range].iter().map(point));
-            let pick = |triangle: &[u32; 3]| triangle.map(|corner| own[corner as usize]);
-            triangles.extend(triangulator.triangulate(&points).iter().map(pick));
+            continue;
         }
-        start += corners;
+        points.clear();
+        points.extend(own.iter().map(|&vertex| if vertex == ABSENT { DVec3::NAN } else { point(parsed, vertex) }));
+        let pick = |triangle: &[u32; 3]| triangle.map(|corner| own[corner as usize]);
+        triangles.extend(triangulator.triangulate(&points).iter().map(pick));
     }
     Ok(triangles)
+}
+
+/// The same numbers, three by three: without a copy where that can be.
+fn in_threes(mut numbers: Vec<u32>) -> Vec<[u32; 3]> {
+    numbers.shrink_to_fit();
+    bytemuck::allocation::try_cast_vec(numbers).unwrap_or_else(|(_, numbers)| numbers.as_chunks::<3>().0.to_vec())
+}
+
+/// From which triangle on which smoothing group holds; `None` for a file that does not speak of them.
+fn smoothing_runs(parsed: &Parsed) -> Option<Vec<(u32, u32)>> {
+    let runs = &parsed.smoothing_runs;
+    let (mut found, mut next, mut triangles) = (Vec::with_capacity(runs.len()), 0, 0);
+    for (face, corners) in parsed.faces.corner_counts().enumerate().take_while(|_| !runs.is_empty()) {
+        if let Some(&(_, group)) = runs.get(next).filter(|run| run.0 == face) {
+            found.push((triangles, group));
+            next += 1;
+        }
+        triangles += corners as u32 - 2;
+    }
+    (!runs.is_empty()).then_some(found)
 }
 
 /// The face that each triangle was cut from, numbered from 0 in the order of the file.
@@ -169,7 +198,7 @@ fn source_faces(parsed: &Parsed) -> Vec<u32> {
 
 /// The names of the materials that faces use, and which each triangle has.
 fn materials(parsed: &Parsed) -> (Vec<Option<String>>, Materials) {
-    let faces = parsed.faces.count;
+    let faces = parsed.faces.count();
     let starts = std::iter::once((0, None)).chain(parsed.material_runs.iter().map(|&(face, name)| (face, Some(name))));
     let ends = parsed.material_runs.iter().map(|&(face, _)| face).chain([faces]);
     let mut slots = HashMap::new();

@@ -1,8 +1,8 @@
 //! Wavefront OBJ files and their material libraries.
 //!
 //! ```text
-//! lines -> parse -> triangulate, origin -> mesh
-//!       -> library (tobj) -> mtl -> textures
+//! lines -> parse -> faces -> triangulate, origin -> mesh
+//!       -> library (tobj) -> mtl, maps, textures -> materials
 //! ```
 //!
 //! A file is one mesh and one object, named after the file. Triangles are numbered in the order of the file, whatever
@@ -18,12 +18,18 @@
 //! read again what was read already, so the statements are read here once. For libraries, where the cost does not
 //! matter and each value can be checked before tobj sees it, it does the reading (`library.rs`).
 
+mod colors;
+mod faces;
 mod find_file;
 mod library;
 mod lines;
+mod maps;
+mod materials;
 mod mesh;
 mod mtl;
+mod names;
 mod parse;
+mod texels;
 mod textures;
 mod triangulate;
 
@@ -32,13 +38,12 @@ use std::io::BufReader;
 use std::path::Path;
 
 use crate::error::{Error, Result};
-use crate::formats::{Ledger, LoadOptions, Model, Treatment, rounding};
+use crate::formats::{Ledger, LoadOptions, Model, NormalMode, Scope, Treatment, rounding};
 use crate::progress::Progress;
 use crate::scene::{Material, Object, Shape};
 use library::Libraries;
 use lines::Lines;
 use parse::Parsed;
-use textures::Textures;
 
 /// Bytes between two reports of progress.
 const BYTES_PER_STEP: u64 = 1 << 20;
@@ -55,40 +60,40 @@ const BYTES_PER_STEP: u64 = 1 << 20;
 pub fn load(path: &Path, options: &LoadOptions, progress: &dyn Progress) -> Result<Model> {
     let mut ledger = Ledger::default();
     ledger.note_file(path);
-    let mut parsed = read(path, progress)?;
+    let mut parsed = read(path, options.normals, progress)?;
     parsed.finish(&mut ledger);
-    if parsed.faces.count == 0 {
+    if parsed.faces.count() == 0 {
         return Err(Error::file("the file has no faces").remedy("export it with polygons").at_path(path));
     }
     let libraries = std::mem::take(&mut parsed.libraries);
     let name = path.file_stem().map_or_else(|| "mesh".into(), |stem| stem.to_string_lossy());
-    let (mesh, material_names) = mesh::build(parsed, &name, options, progress).map_err(|error| error.at_path(path))?;
+    let (mut mesh, material_names) =
+        mesh::build(parsed, &name, options, progress, &mut ledger).map_err(|error| error.at_path(path))?;
     rounding::note(&mesh.rounding, &name, &mut ledger);
 
     let folder = path.parent().unwrap_or(Path::new(""));
     let libraries = Libraries::read(folder, &libraries, &mut ledger);
-    let mut textures = Textures::default();
-    let materials = material_names.iter().map(|name| material(name.as_deref(), &libraries, &mut textures, &mut ledger));
-    let materials = materials.collect();
+    let (materials, textures) = materials::read(&material_names, &libraries, mesh.colors.is_some(), &mut ledger);
+    if mesh.uvs.is_none() && materials.iter().any(|material| material.textures().next().is_some()) {
+        let warning = "images on a mesh without texture coordinates (vt): their lower left corner used";
+        ledger.note_in(Treatment::Warning, warning, Scope::Mesh(0));
+    }
+    let has_normal_map = |material: &Material| material.detail.as_ref().is_some_and(|detail| detail.normal.is_some());
+    mesh.compute_tangents(|number| materials.get(number as usize).is_some_and(has_normal_map))
+        .map_err(|error| error.at_path(path))?;
     let object =
         Object { name: name.into_owned(), shape: Shape::Mesh(0), transform: options.up.to_y(), material: None };
-    Ok(Model {
-        meshes: vec![mesh],
-        materials,
-        textures: textures.into_list(),
-        objects: vec![object],
-        ledger,
-        ..Default::default()
-    })
+    Ok(Model { meshes: vec![mesh], materials, textures, objects: vec![object], ledger, ..Default::default() })
 }
 
 /// Reads all statements.
-fn read(path: &Path, progress: &dyn Progress) -> Result<Parsed> {
+fn read(path: &Path, normals: NormalMode, progress: &dyn Progress) -> Result<Parsed> {
     let system = |cause| Error::system(path, cause);
     let file = File::open(path).map_err(system)?;
     progress.begin("load", file.metadata().map_err(system)?.len());
     let mut lines = Lines::new(path, BufReader::with_capacity(1 << 16, file));
-    let mut parsed = Parsed::default();
+    // Corners that differ in their normal alone are one vertex where the file's normals are not wanted.
+    let mut parsed = if normals == NormalMode::File { Parsed::default() } else { Parsed::without_normals() };
     let mut reported = 0;
     while let Some(statement) = lines.read()? {
         let line = statement.line;
@@ -101,22 +106,6 @@ fn read(path: &Path, progress: &dyn Progress) -> Result<Parsed> {
     }
     progress.advance(lines.bytes() - reported);
     Ok(parsed)
-}
-
-/// The material that `usemtl` calls by this name; a neutral one of that name if no library defines it.
-fn material(name: Option<&str>, libraries: &Libraries, textures: &mut Textures, ledger: &mut Ledger) -> Material {
-    let Some(name) = name.filter(|name| !name.is_empty()) else { return Material::default() };
-    let Some((source, folder)) = libraries.get(name) else {
-        if !libraries.incomplete {
-            let warning = format!("material `{name}` is not defined: neutral material used");
-            ledger.note(Treatment::Warning, warning, 1);
-        }
-        return Material { name: name.to_owned(), ..Default::default() };
-    };
-    let mut material = mtl::material(source, ledger);
-    material.diffuse_texture =
-        source.diffuse_texture.as_deref().and_then(|statement| textures.get(folder, statement, ledger));
-    material
 }
 
 #[cfg(test)]

@@ -5,16 +5,20 @@
 //!
 //! | MTL | here |
 //! |---|---|
-//! | `Kd`, `map_Kd` | diffuse, and its texture, which it multiplies; a black `Kd` under a texture counts as white |
+//! | `Kd`, `map_Kd` | diffuse, and its texture, which it multiplies; a black `Kd` under a texture counts as white; the texture's own alpha is not used, as in Blender |
 //! | `Ka` | not used: the ambient term is the scene's ambient factor times the base colour |
 //! | `Ks` | `ks`, the highlight's weight, from `illum 2` on; without `illum` as for 2 |
 //! | `Ns` | `shininess`, at least 1 |
-//! | `Ke` | `emission`: the surface is seen bright, but does not light others |
+//! | `map_Ks` | multiplies `ks`, but not the mirror; a `Ks` that is not given counts as white under it |
+//! | `Ke`, `map_Ke` | `emission` and its texture: the surface is seen bright, but does not light others; a black `Ke` under a texture counts as white |
+//! | `Pr`, `Pm`, `map_Pr`, `map_Pm` | glTF's metallic-roughness rule with the base `Kd`, instead of `Ks`, `Ns` and `illum`; not for glass |
+//! | `norm`, `map_Bump`, `bump` | a normal map; heights become one |
 //! | `illum 0` to `2` | no mirror |
 //! | `illum 3`, `5`, `8` | `kr = Ks`; the Fresnel effect of 5 is left out, because Phong mirrors do not depend on the angle |
 //! | `illum 6`, `7` | glass: see below |
 //! | `illum 4`, `9` | a blend where `d` is below 1, glass where `Ni` is above 1, and otherwise as `illum 2`: Maya writes `illum 4`, `Ni 1.00` and no `d` for everything |
 //! | `illum 10` | as 2: shadow catchers are not known here |
+//! | `map_d` | a blend too, times `d`: by the image's alpha if it has one that varies, otherwise by its luminance |
 //! | `d`, `Tr` (which is 1 - d) | below 1, other than for glass: a blend. `Tr 1` alone counts as opaque: some exporters mean that |
 //!
 //! **Glass** has `ior = Ni` (1.5 where that is not given) and `kr` = the lesser of `Ks` and what a surface of that index
@@ -28,16 +32,27 @@
 //!
 //! In all cases `kr + kt` is at most 1.
 
-use crate::formats::{Ledger, Treatment};
 use crate::scene::{Material, Rgb};
 
 /// The index of refraction of glass that does not say its own.
 const GLASS: f32 = 1.5;
 
-/// The material without its texture. Colours are taken as linear numbers.
-pub(super) fn material(source: &tobj::Material, ledger: &mut Ledger) -> Material {
+/// A material by the rule, and what of it was approximated.
+pub(super) struct Phong {
+    /// Its terms, without images and as if all of it were there. Colours are taken as linear numbers.
+    pub material: Material,
+    /// How much of the surface is there, below 1; `None` for all of it, and for glass.
+    pub opacity: Option<f32>,
+    /// Whether light goes through it and is bent.
+    pub is_glass: bool,
+    /// What is not as the format says.
+    pub approximations: Vec<&'static str>,
+}
+
+/// The material of a definition.
+pub(super) fn material(source: &tobj::Material) -> Phong {
     let color = |values: Option<[f32; 3]>| values.map(Rgb::from_array);
-    let mut approximate = |what: &str| ledger.note(Treatment::Approximated, what, 1);
+    let mut approximations = Vec::new();
     let mut result = Material { name: source.name.clone(), ..Default::default() };
     let textured = source.diffuse_texture.is_some();
     result.diffuse = match color(source.diffuse) {
@@ -49,7 +64,8 @@ pub(super) fn material(source: &tobj::Material, ledger: &mut Ledger) -> Material
     result.shininess = source.shininess.unwrap_or(result.shininess).max(1.0);
 
     let model = source.illumination_model.unwrap_or(2);
-    let specular = color(source.specular).unwrap_or(Rgb::ZERO);
+    let unsaid = if source.specular_texture.is_some() { Rgb::ONE } else { Rgb::ZERO };
+    let specular = color(source.specular).unwrap_or(unsaid);
     result.ks = if model >= 2 { specular } else { Rgb::ZERO };
     let index = source.optical_density.filter(|&index| index > 0.0);
     let opacity = opacity(source);
@@ -67,24 +83,18 @@ pub(super) fn material(source: &tobj::Material, ledger: &mut Ledger) -> Material
         _ => Rgb::ZERO,
     };
     if is_glass {
-        approximate("glass (illum 4, 6, 7, 9): mirrors as it does head-on, from every side");
+        approximations.push("glass (illum 4, 6, 7, 9): mirrors as it does head-on, from every side");
         result.kt = (Rgb::ONE - result.kr) * hue(source.unknown_param.get("Tf"));
         result.ior = index.unwrap_or(GLASS);
-    } else if blends {
-        result.kt = Rgb::splat(1.0 - opacity);
-        result.ior = 1.0;
-        result.ks *= opacity;
-        result.kr *= opacity;
-        result.emission *= opacity;
     }
     match model {
-        0 => approximate("illum 0: shaded like illum 1"),
-        4 | 9 if !is_glass && !blends => approximate("illum 4 or 9 of an opaque material: shaded like illum 2"),
-        5 => approximate("illum 5: mirrors the same from every side"),
-        10 => approximate("illum 10: shaded like illum 2"),
+        0 => approximations.push("illum 0: shaded like illum 1"),
+        4 | 9 if !is_glass && !blends => approximations.push("illum 4 or 9 of an opaque material: shaded like illum 2"),
+        5 => approximations.push("illum 5: mirrors the same from every side"),
+        10 => approximations.push("illum 10: shaded like illum 2"),
         _ => {}
     }
-    result
+    Phong { material: result, opacity: blends.then_some(opacity), is_glass, approximations }
 }
 
 /// The share of the surface that is there: `d`, or 1 - `Tr`.
@@ -115,7 +125,8 @@ mod tests {
     fn convert(text: &str) -> Material {
         let text = format!("newmtl a\n{}\n", text.replace("; ", "\n"));
         let (materials, _) = tobj::load_mtl_buf(&mut text.as_bytes()).unwrap();
-        material(&materials[0], &mut Ledger::default())
+        let phong = material(&materials[0]);
+        phong.material.blended(phong.opacity.unwrap_or(1.0))
     }
 
     #[test]

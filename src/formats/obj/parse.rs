@@ -4,7 +4,9 @@ use std::collections::{BTreeMap, HashMap};
 
 use glam::{DVec3, Vec2, Vec3};
 
+use super::faces::Faces;
 use super::lines::Statement;
+use super::names::Names;
 use super::triangulate::MOST_CORNERS;
 use crate::error::{Error, Result};
 use crate::formats::{Ledger, Treatment};
@@ -20,21 +22,31 @@ const MOST_KEYWORDS: usize = 40;
 pub(super) struct Parsed {
     /// `v`, in f64.
     pub positions: Vec<DVec3>,
+    /// The colours of `v` statements, as they are; empty while none has one, NaN for one without.
+    pub colors: Vec<[f32; 3]>,
     /// `vt`.
     pub uvs: Vec<Vec2>,
     /// `vn`, as they are.
     pub normals: Vec<Vec3>,
     /// `f`.
     pub faces: Faces,
+    /// Names of objects and groups.
+    pub names: Names,
     /// The names that `usemtl` gave, each once.
     pub material_names: Vec<String>,
     /// Where the material changes: the face's number and the position of the material's name.
     pub material_runs: Vec<(usize, usize)>,
+    /// Where the smoothing group changes: the face's number and the group, 0 for none; empty without `s` statements.
+    pub smoothing_runs: Vec<(usize, u32)>,
     /// The rest of each `mtllib` and its line.
     pub libraries: Vec<(String, usize)>,
+    /// Whether corners have no normals, whatever the file says.
+    without_normals: bool,
     name_positions: HashMap<String, usize>,
     unused: BTreeMap<String, u64>,
     counts: Counts,
+    /// The corners of the face being read: numbers of position, texture coordinate and normal.
+    corners: Vec<[u32; 3]>,
 }
 
 /// How often something was worked around or left out within a statement.
@@ -42,63 +54,21 @@ pub(super) struct Parsed {
 struct Counts {
     colors: u64,
     weights: u64,
+    further_numbers: u64,
     small_faces: u64,
     attributes_outside: u64,
     normals_not_finite: u64,
     uvs_not_finite: u64,
-}
-
-/// Polygons: 0-based numbers per corner, corners counted per face.
-#[derive(Default)]
-pub(super) struct Faces {
-    /// How many there are.
-    pub count: usize,
-    /// Position number of each corner; [`ABSENT`] where it cannot be in the file.
-    pub positions: Vec<u32>,
-    /// Texture coordinate number of each corner or [`ABSENT`]; empty while no corner has one.
-    pub uvs: Vec<u32>,
-    /// Normal number of each corner or [`ABSENT`]; empty while no corner has one.
-    pub normals: Vec<u32>,
-    /// Corners of each face; empty while all are triangles.
-    corner_counts: Vec<u32>,
-    /// For each face that was left out, how many of those that were kept come before it.
-    left_out: Vec<usize>,
-}
-
-impl Faces {
-    /// How many corners each face has.
-    pub fn corner_counts(&self) -> impl Iterator<Item = usize> + '_ {
-        (0..self.count).map(|face| self.corner_counts.get(face).map_or(3, |&count| count as usize))
-    }
-
-    /// For each face the number that it has among all of the file's, those that were left out among them; from 0.
-    pub fn numbers_in_file(&self) -> impl Iterator<Item = usize> + '_ {
-        let mut before = 0;
-        (0..self.count).map(move |face| {
-            before += self.left_out[before..].iter().take_while(|&&kept| kept <= face).count();
-            face + before
-        })
-    }
-
-    /// The number of triangles: a face of n corners gives n - 2.
-    pub fn triangle_count(&self) -> usize {
-        self.positions.len() - 2 * self.count
-    }
-
-    /// Ends the face whose corners are those from `start` on.
-    fn end(&mut self, start: usize) {
-        let corners = self.positions.len() - start;
-        if corners != 3 && self.corner_counts.is_empty() {
-            self.corner_counts.resize(self.count, 3);
-        }
-        if corners != 3 || !self.corner_counts.is_empty() {
-            self.corner_counts.push(corners as u32);
-        }
-        self.count += 1;
-    }
+    smoothing: u64,
+    smoothing_unknown: u64,
 }
 
 impl Parsed {
+    /// Nothing yet; normals of corners will be passed over.
+    pub fn without_normals() -> Self {
+        Self { without_normals: true, ..Self::default() }
+    }
+
     /// Takes in one statement.
     ///
     /// # Errors
@@ -115,6 +85,18 @@ impl Parsed {
                 self.use_material(rest);
                 Ok(())
             }
+            "s" => {
+                self.smoothing_group(rest);
+                Ok(())
+            }
+            "o" => {
+                self.names.object(rest, self.faces.count());
+                Ok(())
+            }
+            "g" => {
+                self.names.group(rest, self.faces.count());
+                Ok(())
+            }
             "mtllib" => {
                 self.libraries.push((rest.to_owned(), line));
                 Ok(())
@@ -129,13 +111,35 @@ impl Parsed {
     fn position(&mut self, rest: &str) -> Result<()> {
         let mut words = rest.split_ascii_whitespace();
         let position = DVec3::new(number(words.next())?, number(words.next())?, number(words.next())?);
-        match words.count() {
-            0 => {}
-            1 | 2 => self.counts.weights += 1,
-            _ => self.counts.colors += 1,
-        }
         self.positions.push(position);
-        check_count(self.positions.len())
+        check_count(self.positions.len())?;
+        let Some(first) = words.next() else {
+            if !self.colors.is_empty() {
+                self.colors.push([f32::NAN; 3]);
+            }
+            return Ok(());
+        };
+        self.after_position(first, words)
+    }
+
+    /// What stands in a `v` statement after the coordinates: a weight, a colour, or more.
+    fn after_position<'a>(&mut self, first: &str, mut words: impl Iterator<Item = &'a str>) -> Result<()> {
+        let mut color = [f32::NAN; 3];
+        match (words.next(), words.next(), words.next()) {
+            (Some(second), Some(third), None) => {
+                color = [first, second, third].map(|word| word.parse::<f64>().map_or(f32::NAN, |value| value as f32));
+                self.counts.colors += 1;
+            }
+            (_, None, _) => self.counts.weights += 1,
+            _ => self.counts.further_numbers += 1,
+        }
+        if self.colors.is_empty() && self.counts.colors > 0 {
+            self.colors.resize(self.positions.len() - 1, [f32::NAN; 3]);
+        }
+        if self.counts.colors > 0 {
+            self.colors.push(color);
+        }
+        Ok(())
     }
 
     fn uv(&mut self, rest: &str) -> Result<()> {
@@ -153,54 +157,70 @@ impl Parsed {
         let mut next = || Ok(number(words.next())? as f32);
         let normal = Vec3::new(next()?, next()?, next()?);
         self.counts.normals_not_finite += u64::from(!normal.is_finite());
-        // Zero means the face's normal: one bad normal must not spoil the mesh.
+        // Zero means none: one bad normal must not spoil the mesh.
         self.normals.push(if normal.is_finite() { normal } else { Vec3::ZERO });
         check_count(self.normals.len())
     }
 
     fn face(&mut self, rest: &str) -> Result<()> {
-        let start = self.faces.positions.len();
+        self.corners.clear();
         for word in rest.split_ascii_whitespace() {
             self.corner(word)?;
         }
-        if self.faces.positions.len() - start < 3 {
+        if self.corners.len() < 3 {
             self.counts.small_faces += 1;
-            self.faces.left_out.push(self.faces.count);
-            self.faces.positions.truncate(start);
-            self.faces.uvs.truncate(start);
-            self.faces.normals.truncate(start);
+            self.faces.leave_out();
             return Ok(());
         }
-        self.faces.end(start);
-        check_count(self.faces.positions.len())
+        self.faces.push(&self.corners, self.positions.len());
+        check_count(self.faces.corner_count())
     }
 
     /// One corner: `v`, `v/vt`, `v//vn` or `v/vt/vn`.
     fn corner(&mut self, word: &str) -> Result<()> {
-        let malformed = || {
-            let remedy = "write `v`, `v/vt`, `v//vn` or `v/vt/vn` with whole numbers";
-            Error::file(format!("`{}` is not a corner of a face", short(word))).remedy(remedy)
-        };
+        let counts = [self.positions.len(), self.uvs.len(), self.normals.len()];
+        let mut corner = [ABSENT; 3];
         let mut parts = word.split('/');
-        let mut index = |count: usize| match parts.next() {
-            None | Some("") => Ok(None),
-            Some(part) => match part.parse::<i64>().map_err(|_| malformed())? {
-                0 => Err(Error::file(format!("`{}` has the index 0", short(word)))
-                    .remedy("indices count from 1; negative ones count back from the last")),
-                index => Ok(Some(resolve(index, count))),
-            },
-        };
-        let position = index(self.positions.len())?.ok_or_else(malformed)?;
-        let uv = index(self.uvs.len())?;
-        let normal = index(self.normals.len())?;
-        if parts.next().is_some() {
-            return Err(malformed());
+        for (part, (number, count)) in corner.iter_mut().zip(counts).enumerate() {
+            *number = match parts.next() {
+                None | Some("") if part == 0 => return Err(malformed(word)),
+                None | Some("") => continue,
+                Some(index) => match index.parse::<i64>().map_err(|_| malformed(word))? {
+                    0 => {
+                        return Err(Error::file(format!("`{}` has the index 0", short(word)))
+                            .remedy("indices count from 1; negative ones count back from the last"));
+                    }
+                    index => resolve(index, count),
+                },
+            };
+            self.counts.attributes_outside += u64::from(part > 0 && *number == ABSENT);
         }
-        let before = self.faces.positions.len();
-        self.faces.positions.push(position);
-        self.counts.attributes_outside += put(&mut self.faces.uvs, before, uv);
-        self.counts.attributes_outside += put(&mut self.faces.normals, before, normal);
+        if parts.next().is_some() {
+            return Err(malformed(word));
+        }
+        if self.without_normals {
+            corner[2] = ABSENT;
+        }
+        self.corners.push(corner);
         Ok(())
+    }
+
+    /// `s`: the group in which the faces that follow are smooth; `off` and 0 for none.
+    fn smoothing_group(&mut self, rest: &str) {
+        self.counts.smoothing += 1;
+        let group = match rest {
+            "off" | "" => 0,
+            "on" => 1,
+            word => word.parse().unwrap_or_else(|_| {
+                self.counts.smoothing_unknown += 1;
+                0
+            }),
+        };
+        let face = self.faces.count();
+        match self.smoothing_runs.last_mut() {
+            Some(last) if last.0 == face => last.1 = group,
+            _ => self.smoothing_runs.push((face, group)),
+        }
     }
 
     fn use_material(&mut self, name: &str) {
@@ -213,7 +233,7 @@ impl Parsed {
                 position
             }
         };
-        let face = self.faces.count;
+        let face = self.faces.count();
         match self.material_runs.last_mut() {
             Some(last) if last.0 == face => last.1 = position,
             _ => self.material_runs.push((face, position)),
@@ -234,32 +254,32 @@ impl Parsed {
     /// what was left out or worked around.
     pub fn finish(&mut self, ledger: &mut Ledger) {
         // Numbers beyond the last can only be told now: a face may come before its vertices.
-        for (numbers, count) in [(&mut self.faces.uvs, self.uvs.len()), (&mut self.faces.normals, self.normals.len())] {
-            for number in numbers.iter_mut().filter(|number| **number != ABSENT && **number as usize >= count) {
-                *number = ABSENT;
-                self.counts.attributes_outside += 1;
-            }
-        }
+        self.counts.attributes_outside += self.faces.clear_outside(self.uvs.len(), self.normals.len());
         let mut note = |treatment, feature: &str, count| {
             if count > 0 {
                 ledger.note(treatment, feature, count);
             }
         };
-        let outside = self.faces.positions.iter().filter(|&&number| number as usize >= self.positions.len()).count();
-        let huge = self.faces.corner_counts.iter().filter(|&&corners| corners as usize > MOST_CORNERS).count();
-        note(Treatment::Honoured, "faces (f)", self.faces.count as u64);
+        let outside = self.faces.positions().filter(|&number| number as usize >= self.positions.len()).count();
+        let huge = self.faces.corner_counts().filter(|&corners| corners > MOST_CORNERS).count();
+        let counts = &self.counts;
+        note(Treatment::Honoured, "faces (f)", self.faces.count() as u64);
         note(Treatment::Approximated, "face with more than 65536 corners: cut as if it were convex", huge as u64);
-        note(Treatment::Ignored, "vertex colours (v with 6 numbers or more)", self.counts.colors);
-        note(Treatment::Ignored, "vertex weights (v with 4 numbers)", self.counts.weights);
-        note(Treatment::Warning, "face with fewer than 3 corners: left out", self.counts.small_faces);
+        note(Treatment::Ignored, "numbers after the colour (v with 7 numbers or more)", counts.further_numbers);
+        note(Treatment::Ignored, "vertex weights (v with 4 numbers)", counts.weights);
+        if self.without_normals {
+            note(Treatment::Ignored, "smoothing groups (s): --normals says otherwise", counts.smoothing);
+        } else {
+            note(Treatment::Honoured, "smoothing groups (s)", counts.smoothing);
+            note(Treatment::Warning, "smoothing group that is not a number: flat", counts.smoothing_unknown);
+        }
+        note(Treatment::Honoured, "object names (o)", self.names.objects);
+        note(Treatment::Honoured, "group names (g)", self.names.groups);
+        note(Treatment::Warning, "face with fewer than 3 corners: left out", counts.small_faces);
         note(Treatment::Warning, "corner whose vertex is not in the file: its triangles are dropped", outside as u64);
-        note(
-            Treatment::Warning,
-            "corner whose vt or vn is not in the file: it has none",
-            self.counts.attributes_outside,
-        );
-        note(Treatment::Warning, "vn that is not finite: face normal used", self.counts.normals_not_finite);
-        note(Treatment::Warning, "vt that is not finite: (0, 0) used", self.counts.uvs_not_finite);
+        note(Treatment::Warning, "corner whose vt or vn is not in the file: it has none", counts.attributes_outside);
+        note(Treatment::Warning, "vn that is not finite: as if there were none", counts.normals_not_finite);
+        note(Treatment::Warning, "vt that is not finite: (0, 0) used", counts.uvs_not_finite);
         for (keyword, count) in std::mem::take(&mut self.unused) {
             ledger.note(Treatment::Ignored, describe(&keyword), count);
         }
@@ -272,9 +292,6 @@ fn describe(keyword: &str) -> String {
         "" => return "other unknown statements".to_owned(),
         "p" => "points",
         "l" => "lines",
-        "o" => "object names",
-        "g" => "group names",
-        "s" => "smoothing groups",
         "vp" | "cstype" | "deg" | "bmat" | "step" | "curv" | "curv2" | "surf" | "parm" | "trim" | "hole" | "scrv"
         | "sp" | "end" | "con" | "ctech" | "stech" => "free-form curves and surfaces",
         "mg" | "bevel" | "c_interp" | "d_interp" | "lod" | "shadow_obj" | "trace_obj" | "maplib" | "usemap" => {
@@ -291,15 +308,11 @@ fn resolve(index: i64, count: usize) -> u32 {
     u32::try_from(number).unwrap_or(ABSENT)
 }
 
-/// Appends a corner's attribute to an array that is empty until the first corner has one; the count of bad numbers.
-fn put(numbers: &mut Vec<u32>, corners_before: usize, number: Option<u32>) -> u64 {
-    if numbers.is_empty() && number.is_some() {
-        numbers.resize(corners_before, ABSENT);
-    }
-    if number.is_some() || !numbers.is_empty() {
-        numbers.push(number.unwrap_or(ABSENT));
-    }
-    u64::from(number == Some(ABSENT))
+/// A corner that cannot be read.
+#[cold]
+fn malformed(word: &str) -> Error {
+    let remedy = "write `v`, `v/vt`, `v//vn` or `v/vt/vn` with whole numbers";
+    Error::file(format!("`{}` is not a corner of a face", short(word))).remedy(remedy)
 }
 
 /// A coordinate. What C libraries print for NaN and infinity is read too.
@@ -352,10 +365,10 @@ mod tests {
     #[test]
     fn attributes_may_be_missing_here_and_there() {
         let parsed = parse("v 0 0 0\nvt 1\nvn 0 0 1\nf 1 1 1\nf 1/1 1//1 1/1/1\nf 1/ 1// 1 1").unwrap();
-        assert_eq!(parsed.faces.positions, [0; 10]);
         let a = ABSENT;
-        assert_eq!(parsed.faces.uvs, [a, a, a, 0, a, 0, a, a, a, a]);
-        assert_eq!(parsed.faces.normals, [a, a, a, a, 0, 0, a, a, a, a]);
+        let corners: Vec<_> = (0..10).map(|corner| parsed.faces.corner(corner)).collect();
+        let pairs = [[a, a], [a, a], [a, a], [0, a], [a, 0], [0, 0], [a, a], [a, a], [a, a], [a, a]];
+        assert_eq!(corners, pairs.map(|[uv, normal]| [0, uv, normal]));
         assert_eq!(parsed.faces.corner_counts().collect::<Vec<_>>(), [3, 3, 4]);
         assert_eq!(parsed.faces.triangle_count(), 4);
         assert_eq!(parsed.uvs, [Vec2::new(1.0, 0.0)]);
@@ -364,7 +377,7 @@ mod tests {
     #[test]
     fn negative_indices_count_back_from_where_they_stand() {
         let parsed = parse("v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\nv 9 9 9\nf -3 -2 -1\nf -5 1 99").unwrap();
-        assert_eq!(parsed.faces.positions, [0, 1, 2, 1, 2, 3, ABSENT, 0, 98]);
+        assert_eq!(parsed.faces.positions().collect::<Vec<_>>(), [0, 1, 2, 1, 2, 3, ABSENT, 0, 98]);
     }
 
     #[test]
@@ -374,7 +387,8 @@ mod tests {
         assert!(parsed.positions[1].x.is_nan() && parsed.positions[1].z.is_nan());
         assert_eq!(parsed.positions[1].y, f64::NEG_INFINITY);
         assert_eq!(parsed.positions[2], DVec3::new(1.0, 100.0, 0.1));
-        assert_eq!(parsed.counts.colors, 1);
+        assert_eq!(parsed.colors.len(), 3);
+        assert!(parsed.colors[0][0].is_nan() && parsed.colors[2] == [1.0, 0.5, 0.5]);
     }
 
     #[test]
@@ -403,7 +417,7 @@ mod tests {
 
     #[test]
     fn everything_left_out_is_in_the_ledger() {
-        let mut text = "p 1\nl 1 2\nl 2 3\ns 1\nf 1 2\ncurv 1 2 3\n".to_owned();
+        let mut text = "p 1\nl 1 2\nl 2 3\nbevel on\nf 1 2\ncurv 1 2 3\n".to_owned();
         (0..100).for_each(|i| text += &format!("word{i}\n"));
         let mut ledger = Ledger::default();
         parse(&text).unwrap().finish(&mut ledger);

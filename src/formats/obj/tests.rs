@@ -322,3 +322,215 @@ fn real_models_have_their_known_numbers_of_triangles() {
         assert_eq!(model.meshes[0].triangle_count(), triangles, "{file}");
     }
 }
+
+/// Two squares that meet at a right angle along the x axis, and a third in the plane of the first.
+const FOLDED: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 1 0 1\nv 0 0 1\nv 1 2 0\nv 0 2 0\n";
+
+/// The shading normals of the triangles' corners; zero for the face's.
+fn corner_normals(mesh: &TriangleMesh) -> Vec<[Vec3; 3]> {
+    let normal = |vertex: u32| mesh.normals.as_ref().map_or(Vec3::ZERO, |normals| normals[vertex as usize]);
+    mesh.indices.iter().map(|triangle| triangle.map(normal)).collect()
+}
+
+#[test]
+fn smoothing_groups_are_smooth_within_and_sharp_without() {
+    let between = Vec3::new(0.0, 1.0, 1.0).normalize();
+    let near = |found: Vec3, expected: Vec3| (found - expected).abs().max_element() < 1e-6;
+
+    let one = load_text(&format!("{FOLDED}s 4\nf 1 2 3 4\nf 1 6 5 2\ns off\nf 4 3 7 8\n"));
+    let normals = corner_normals(&one.meshes[0]);
+    assert!(near(normals[0][0], between) && near(normals[0][1], between) && near(normals[0][2], Vec3::Z));
+    assert_eq!(normals[4..], [[Vec3::ZERO; 3]; 2]);
+    assert_eq!(one.meshes[0].positions.len(), 8 + 2, "split between the group and what is flat");
+    assert!(one.ledger.entries().any(|entry| entry == (Treatment::Honoured, "smoothing groups (s)", 2)));
+
+    let two = load_text(&format!("{FOLDED}s 1\nf 1 2 3 4\ns 2\nf 1 6 5 2\n"));
+    for (normals, face) in corner_normals(&two.meshes[0]).iter().zip([Vec3::Z, Vec3::Z, Vec3::Y, Vec3::Y]) {
+        assert!(normals.iter().all(|&normal| near(normal, face)), "{normals:?}");
+    }
+    let flat = load_text(&format!("{FOLDED}s off\nf 1 2 3 4\nf 1 6 5 2\n"));
+    assert_eq!(flat.meshes[0].normals, None);
+}
+
+#[test]
+fn only_corners_without_a_normal_are_smoothed() {
+    let text = format!("{FOLDED}vn 1 2 3\ns 1\nf 1//1 2//1 3 4\nf 1 6 5 2\n");
+    let normals = corner_normals(&load_text(&text).meshes[0]);
+    let given = Vec3::new(1.0, 2.0, 3.0);
+    assert_eq!((normals[0][0], normals[0][1]), (given, given));
+    assert!((normals[0][2] - Vec3::Z).abs().max_element() < 1e-6);
+    assert!((normals[2][0] - Vec3::new(0.0, 1.0, 1.0).normalize()).abs().max_element() < 1e-6);
+}
+
+#[test]
+fn a_crease_angle_is_for_files_with_neither_normals_nor_groups() {
+    let smooth = |text: &str, degrees: f64| {
+        let options = LoadOptions { crease_angle: Some(degrees.to_radians()), ..Default::default() };
+        load_files(&[("a.obj", text)], &options).unwrap().meshes.remove(0)
+    };
+    let faces = "f 1 2 3 4\nf 1 6 5 2\nf 4 3 7 8\n";
+    let sharp = corner_normals(&smooth(&format!("{FOLDED}{faces}"), 89.0));
+    let near = |found: Vec3, expected: Vec3| (found - expected).abs().max_element() < 1e-6;
+    assert!(near(sharp[0][0], Vec3::Z) && near(sharp[2][0], Vec3::Y) && near(sharp[4][0], Vec3::Z));
+    let round = corner_normals(&smooth(&format!("{FOLDED}{faces}"), 91.0));
+    assert!(near(round[0][0], Vec3::new(0.0, 1.0, 1.0).normalize()) && near(round[4][0], Vec3::Z));
+    assert_eq!(smooth(&format!("{FOLDED}s off\n{faces}"), 91.0).normals, None);
+    assert_eq!(load_text(&format!("{FOLDED}{faces}")).meshes[0].normals, None);
+}
+
+#[test]
+fn colours_belong_to_positions_and_are_linear() {
+    let model = load_text("v 0 0 0 1 0 0\nv 1 0 0 0 1 0.5\nv 0 1 0\nvt 0 0\nvt 1 1\nf 1/1 2/1 3/1\nf 3/2 2/2 1/2\n");
+    let mesh = &model.meshes[0];
+    let colors = mesh.colors.as_ref().unwrap();
+    let of = |triangle: usize| mesh.indices[triangle].map(|vertex| colors[vertex as usize]);
+    let (red, green, white) = ([65_535, 0, 0, 65_535], [0, 65_535, 14_027, 65_535], [65_535; 4]);
+    assert_eq!((of(0), of(1)), ([red, green, white], [white, green, red]));
+    assert_eq!(warnings(&model), ["v without a colour that can be read beside others: white"]);
+}
+
+#[test]
+fn names_of_objects_and_groups_are_kept() {
+    let model = load_text(&format!("{SQUARE}f 1 2 3\no a\ng b c\nf 1 2 3 4\no d\nf 1 2 3\n"));
+    let names: Vec<_> = model.meshes[0].named_runs().collect();
+    assert_eq!(names, [("default", 0, 1), ("a/b c", 1, 2), ("d", 3, 1)]);
+    assert!(load_text(&format!("{SQUARE}f 1 2 3\n")).meshes[0].groups.is_empty());
+}
+
+/// A file with texture coordinates and a material `m`, whose images are made by `images`.
+fn load_material(mtl: &str, images: &[(&str, image::DynamicImage)]) -> Model {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, image) in images {
+        image.save(folder.path().join(name)).unwrap();
+    }
+    let obj = format!("mtllib m.mtl\n{SQUARE}vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3 4/4\n");
+    std::fs::write(folder.path().join("m.mtl"), format!("newmtl m\n{}\n", mtl.replace("; ", "\n"))).unwrap();
+    std::fs::write(folder.path().join("a.obj"), obj).unwrap();
+    load(&folder.path().join("a.obj"), &LoadOptions::default(), &Silent).unwrap()
+}
+
+fn filled(color: [u8; 4]) -> image::DynamicImage {
+    image::RgbaImage::from_pixel(4, 4, image::Rgba(color)).into()
+}
+
+/// An image whose left half has this alpha, and whose right half is opaque.
+fn half_there(alpha: u8) -> image::DynamicImage {
+    let texel = |x: u32, _| image::Rgba([255, 0, 0, if x < 2 { alpha } else { 255 }]);
+    image::RgbaImage::from_fn(4, 4, texel).into()
+}
+
+/// The terms of the model's only material at texture coordinates.
+fn terms_at(model: &Model, uv: [f64; 2]) -> Material {
+    let texel = |texture: &crate::scene::TextureRef| {
+        let place = texture.place(glam::DVec2::from_array(uv));
+        model.textures[texture.texture as usize].sample_footprint(place, 0.0)
+    };
+    model.materials[0].at(glam::Vec4::ONE, texel)
+}
+
+fn near(found: Vec3, expected: Vec3) -> bool {
+    (found - expected).abs().max_element() < 1e-5
+}
+
+#[test]
+fn images_of_highlights_and_light_multiply() {
+    let images = [("a.png", filled([255, 0, 188, 255]))];
+    let model = load_material("Kd 0.1 0.2 0.3; Ks 0.5 0.5 0.5; map_Ks a.png; Ke 2 2 2; map_Ke a.png", &images);
+    let terms = terms_at(&model, [0.5, 0.5]);
+    // 188 in sRGB is 0.5029 in linear light.
+    assert!(near(terms.ks, Vec3::new(0.5, 0.0, 0.5 * 0.502_886)) && near(terms.emission, 4.0 * terms.ks));
+    assert_eq!((terms.diffuse, model.textures.len()), (Vec3::new(0.1, 0.2, 0.3), 1));
+    // Black under an image of light is what exporters write who mean the image; no Ks means that the image tells all.
+    let model = load_material("Ke 0 0 0; map_Ke a.png; map_Ks a.png; illum 2", &images);
+    let terms = terms_at(&model, [0.5, 0.5]);
+    assert!(near(terms.emission, Vec3::new(1.0, 0.0, 0.502_886)) && near(terms.ks, terms.emission));
+    let missing = load_material("map_Ke none.png; map_Ks none.png; illum 3", &[]);
+    assert_eq!((terms_at(&missing, [0.5, 0.5]).emission, terms_at(&missing, [0.5, 0.5]).kr), (Vec3::ZERO, Vec3::ZERO));
+}
+
+#[test]
+fn an_image_of_opacity_makes_a_blend() {
+    let grey = image::GrayImage::from_fn(4, 4, |x, _| image::Luma([if x < 2 { 51 } else { 255 }])).into();
+    let model = load_material("Kd 1 1 1; d 0.5; map_d grey.png", &[("grey.png", grey)]);
+    assert!(near(terms_at(&model, [0.25, 0.5]).kt, Vec3::splat(0.9)), "luminance 0.2 times 0.5 is there");
+    assert!(near(terms_at(&model, [0.75, 0.5]).kt, Vec3::splat(0.5)));
+    assert!(model.materials[0].lets_light_through());
+
+    // The alpha of the diffuse image counts where map_d names it, and nowhere else.
+    let images = [("a.png", half_there(51))];
+    let plain = load_material("map_Kd a.png", &images);
+    assert!(!plain.materials[0].lets_light_through());
+    assert_eq!(plain.textures[0].sample_footprint(glam::DVec2::new(0.25, 0.5), 0.0).w, 1.0);
+    let same = load_material("map_Kd a.png; map_d a.png", &images);
+    assert_eq!(same.textures.len(), 1, "one image for both");
+    let other = load_material("map_Kd a.png; map_d -imfchan m -clamp on a.png", &images);
+    for model in [same, other] {
+        assert!(near(terms_at(&model, [0.25, 0.5]).kt, Vec3::splat(0.8)));
+        assert!(near(terms_at(&model, [0.75, 0.5]).kt, Vec3::ZERO));
+    }
+    let red = load_material("map_d -imfchan g a.png", &images);
+    assert!(near(terms_at(&red, [0.75, 0.5]).kt, Vec3::ONE), "green is 0 everywhere");
+    let gain = load_material("map_d -mm 0.2 0.5 -imfchan m a.png", &images);
+    assert!(near(terms_at(&gain, [0.75, 0.5]).kt, Vec3::ZERO), "alpha is not adjusted");
+}
+
+#[test]
+fn bumps_are_told_from_normals_and_get_tangents() {
+    let normals = || ("n.png", filled([128, 128, 255, 255]));
+    let ramp = image::GrayImage::from_fn(8, 8, |x, _| image::Luma([20 * x as u8]));
+    for (mtl, scale) in [("norm n.png", 1.0), ("map_Bump -bm 0.5 n.png", 0.5), ("bump n.png; norm n.png", 1.0)] {
+        let model = load_material(mtl, &[normals()]);
+        let normal = model.materials[0].detail.as_ref().unwrap().normal.unwrap();
+        assert_eq!(normal.scale, scale, "{mtl}");
+        assert!(matches!(model.textures[0].texels, crate::scene::texture::Texels::Data8(_)));
+        let tangents = model.meshes[0].tangents.as_ref().unwrap();
+        assert!(tangents.iter().all(|tangent| (*tangent - glam::Vec4::new(1.0, 0.0, 0.0, 1.0)).length() < 1e-6));
+    }
+    let model = load_material("bump -bm 2 h.png", &[("h.png", ramp.into())]);
+    let normal = model.materials[0].detail.as_ref().unwrap().normal.unwrap();
+    let texel = model.textures[normal.texture.texture as usize].sample_footprint(glam::DVec2::splat(0.5), 0.0);
+    // Heights grow by 20/255 a texel, times 2.
+    let expected = Vec3::new(-40.0 / 255.0, 0.0, 1.0).normalize();
+    assert!(near(texel.truncate() * 2.0 - 1.0, expected), "{texel}");
+    assert_eq!(load_material("Kd 1 1 1", &[]).meshes[0].tangents, None);
+}
+
+#[test]
+fn metalness_and_roughness_follow_gltf_s_rule() {
+    use crate::scene::detail::MetallicRoughness;
+    let surface = |metallic, roughness, base| {
+        let model = MetallicRoughness { base, metallic, roughness, ..MetallicRoughness::DEFAULT };
+        Material::default().with_phong_of(&model.surface(Vec3::ONE, |_| glam::Vec4::ONE))
+    };
+    let assert_same = |found: &Material, expected: &Material| {
+        assert!(near(found.diffuse, expected.diffuse) && near(found.ks, expected.ks) && near(found.kr, expected.kr));
+        assert!(
+            (found.shininess / expected.shininess - 1.0).abs() < 1e-3,
+            "{} {}",
+            found.shininess,
+            expected.shininess
+        );
+    };
+    let base = Vec3::new(0.9, 0.5, 0.1);
+    let plain = load_material("Kd 0.9 0.5 0.1; Pm 0.5; Pr 0.2; Ks 1 1 1; Ns 7; illum 3", &[]);
+    assert_same(&plain.materials[0], &surface(0.5, 0.2, base));
+    assert_eq!(plain.materials[0].detail, None);
+    assert!(plain.ledger.all().any(|(treatment, feature, entry)| {
+        treatment == Treatment::Ignored && feature.starts_with("Ks, Ns") && entry.scopes.contains(&Scope::Material(0))
+    }));
+
+    // Two images become one, of which each is a fifth.
+    let images = [("r.png", filled([51, 51, 51, 255])), ("m.png", filled([102, 102, 102, 255]))];
+    let mapped = load_material("Kd 0.9 0.5 0.1; map_Pr r.png; map_Pm m.png", &images);
+    assert_same(&terms_at(&mapped, [0.5, 0.5]), &surface(0.4, 0.2, base));
+    assert_same(&mapped.materials[0], &surface(0.4, 0.2, base));
+    assert_eq!(mapped.textures.len(), 1);
+    let packed = load_material(
+        "Kd 0.9 0.5 0.1; Pm 1; Pr 1; map_Pr p.png; map_Pm p.png; map_Kd white.png; d 0.5",
+        &[("p.png", filled([0, 51, 102, 255])), ("white.png", filled([255; 4]))],
+    );
+    assert_same(&terms_at(&packed, [0.5, 0.5]), &surface(0.4, 0.2, base).blended(0.5));
+    // Glass keeps its own rule.
+    let glass = load_material("Kd 0 0 0; Ks 1 1 1; Pr 0.1; illum 7; Ni 1.5", &[]);
+    assert!(glass.materials[0].is_transmissive());
+}
