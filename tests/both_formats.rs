@@ -31,7 +31,8 @@ fn patch() -> TriangleMesh {
     let normal = |uv: &Vec2| glam::Vec3::new(0.8 * (2.0 * uv.x - 1.0), 0.8 * (2.0 * uv.y - 1.0), 1.0).normalize();
     let (positions, normals) = (uvs.iter().map(place).collect(), uvs.iter().map(normal).collect());
     let at = |i: u32, j: u32| j * (side + 1) + i;
-    let square = |i: u32, j: u32| [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]];
+    let square =
+        |i: u32, j: u32| [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]];
     let indices = (0..side).flat_map(|j| (0..side).flat_map(move |i| square(i, j))).collect();
     TriangleMesh { positions, normals: Some(normals), uvs: Some(uvs), indices, ..TriangleMesh::default() }
 }
@@ -60,7 +61,8 @@ fn write_gltf(folder: &Path, mesh: &TriangleMesh, material: &Value, images: &[&s
     let (mut views, mut accessors) = (Vec::new(), Vec::new());
     let mut add = |values: Vec<u8>, component: u32, kind: &str, count: usize| {
         views.push(json!({"buffer": 0, "byteOffset": bytes.len(), "byteLength": values.len()}));
-        accessors.push(json!({"bufferView": views.len() - 1, "componentType": component, "type": kind, "count": count}));
+        accessors
+            .push(json!({"bufferView": views.len() - 1, "componentType": component, "type": kind, "count": count}));
         bytes.extend(values);
     };
     let count = mesh.positions.len();
@@ -132,7 +134,11 @@ fn dielectrics_and_metals_of_any_roughness() {
 #[test]
 fn light_and_blends() {
     let matt = pbr([0.5, 0.5, 0.5, 1.0], 0.0, 1.0);
-    check("Kd 0.5 0.5 0.5\nPr 1\nPm 0\nKe 0.25 0.5 0", json!({"pbrMetallicRoughness": matt, "emissiveFactor": [0.25, 0.5, 0.0]}), &[]);
+    check(
+        "Kd 0.5 0.5 0.5\nPr 1\nPm 0\nKe 0.25 0.5 0",
+        json!({"pbrMetallicRoughness": matt, "emissiveFactor": [0.25, 0.5, 0.0]}),
+        &[],
+    );
     let blend = json!({"pbrMetallicRoughness": pbr([0.5, 0.25, 0.5, 0.5], 0.0, 0.5), "alphaMode": "BLEND"});
     check("Kd 0.5 0.25 0.5\nPr 0.5\nPm 0\nd 0.5", blend, &[]);
 }
@@ -152,7 +158,11 @@ fn images() {
     let mut all = textured.clone();
     all["metallicFactor"] = json!(0.5);
     let light = json!({"pbrMetallicRoughness": all, "emissiveFactor": [0.5, 0.5, 0.5], "emissiveTexture": image(1)});
-    check("Kd 1 1 1\nPr 1\nPm 0.5\nmap_Kd color.png\nKe 0.5 0.5 0.5\nmap_Ke alpha.png", light, &["color.png", "alpha.png"]);
+    check(
+        "Kd 1 1 1\nPr 1\nPm 0.5\nmap_Kd color.png\nKe 0.5 0.5 0.5\nmap_Ke alpha.png",
+        light,
+        &["color.png", "alpha.png"],
+    );
 
     let mut transparent = pbr([1.0, 1.0, 1.0, 1.0], 0.0, 1.0);
     transparent["baseColorTexture"] = image(0);

@@ -4,6 +4,7 @@ mod accelerators;
 mod architecture;
 mod batches;
 mod bench;
+mod both_formats;
 mod command_line;
 mod common;
 mod detail;
