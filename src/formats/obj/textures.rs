@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec2;
 
-use super::find_file::find_file;
+use super::find_file::{absence, find_file};
 use crate::formats::image_file::read_texture;
+use crate::formats::surroundings::Surroundings;
 use crate::formats::{Ledger, Treatment};
 use crate::scene::texture::Wrap;
 use crate::scene::{Texture, TextureRef};
@@ -14,12 +15,18 @@ use crate::scene::{Texture, TextureRef};
 /// The textures of a model.
 #[derive(Default)]
 pub(super) struct Textures {
+    surroundings: Surroundings,
     list: Vec<Texture>,
     /// By file and whether it is clamped; `None` for an image that could not be read.
     known: HashMap<(PathBuf, bool), Option<u32>>,
 }
 
 impl Textures {
+    /// None yet; images are read from the surroundings.
+    pub fn new(surroundings: Surroundings) -> Self {
+        Self { surroundings, ..Self::default() }
+    }
+
     /// The texture of a `map_` statement, relative to `folder`; `None`, with a warning, for an image that is missing or
     /// cannot be read.
     pub fn get(&mut self, folder: &Path, statement: &str, ledger: &mut Ledger) -> Option<TextureRef> {
@@ -27,8 +34,9 @@ impl Textures {
         for option in &map.unused {
             ledger.note(Treatment::Ignored, format!("texture option {option}"), 1);
         }
-        let Some(path) = find_file(folder, map.file) else {
-            ledger.note(Treatment::Warning, format!("texture `{}` is missing: plain colour used", map.file), 1);
+        let Some(path) = find_file(folder, map.file, &self.surroundings) else {
+            let why = absence(folder, map.file, &self.surroundings);
+            ledger.note(Treatment::Warning, format!("texture `{}` {why}: plain colour used", map.file), 1);
             return None;
         };
         let texture = match self.known.get(&(path.clone(), map.clamp)) {
@@ -52,7 +60,7 @@ impl Textures {
         // The same image wrapped otherwise shares its texels.
         let mut texture = match self.known.get(&(path.to_path_buf(), !clamp)) {
             Some(&other) => self.list[other? as usize].clone(),
-            None => read_texture(path)
+            None => read_texture(path, &self.surroundings.limits)
                 .map_err(|error| ledger.note(Treatment::Warning, format!("{error}: plain colour used"), 1))
                 .ok()?,
         };
@@ -154,7 +162,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         image::RgbImage::new(2, 3).save(folder.path().join("a.png")).unwrap();
         std::fs::write(folder.path().join("bad.png"), "x").unwrap();
-        let (mut textures, mut ledger) = (Textures::default(), Ledger::default());
+        let (mut textures, mut ledger) =
+            (Textures::new(Surroundings::new(folder.path(), &Default::default())), Ledger::default());
         let mut get = |statement: &str| textures.get(folder.path(), statement, &mut ledger).map(|found| found.texture);
         assert_eq!(get("a.png"), Some(0));
         assert_eq!(get("-clamp on A.png"), Some(1));
