@@ -16,6 +16,7 @@ mod hard_cases;
 mod memory;
 mod metamorphic;
 mod models;
+mod nasty;
 mod query;
 mod reference;
 mod report;

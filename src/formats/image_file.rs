@@ -3,15 +3,16 @@
 //! PNG, JPEG, WebP, TGA and BMP become 8-bit texels in sRGB, 16-bit channels rounded to the nearest; Radiance HDR and
 //! OpenEXR become linear floats. Colour profiles and orientation tags are not looked at, as glTF prescribes.
 
-use std::io::{Cursor, Read};
+use std::io::Cursor;
 use std::path::Path;
 
 use exr::meta::MetaData;
 use exr::prelude::{ReadChannels as _, ReadLayers as _};
 use image::error::ImageError;
-use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 
 use crate::error::{Error, Result};
+use crate::formats::Limits;
 use crate::scene::Texture;
 use crate::scene::texture::Texels;
 
@@ -20,10 +21,6 @@ const ACCEPTED: &str = "accepted are PNG, JPEG, WebP, TGA, BMP, HDR and EXR";
 
 /// Most texels along a side.
 const LARGEST_SIDE: u32 = 1 << 16;
-
-/// Most bytes that an image may take, as a file and decoded: a few bytes of a compressed file can ask for terabytes.
-/// 2 GiB hold 23170 x 23170 texels of 8 bits.
-const MOST_BYTES: u64 = 2 << 30;
 
 /// What an infinite texel becomes: the largest finite half float, since halves that overflowed are where infinities in
 /// EXR files come from. Mixed with its neighbours it stays finite.
@@ -35,35 +32,28 @@ const LARGEST_TEXEL: f32 = 65504.0;
 ///
 /// # Errors
 /// Names the file and the cause: it cannot be read, is not an accepted format, is malformed, or is larger than 65536
-/// texels along a side or 2 GiB.
-pub fn read_texture(path: &Path) -> Result<Texture> {
-    let bytes = read_bytes(path)?;
-    decode_texture(&bytes, &path.display().to_string()).map_err(|error| error.at_path(path))
+/// texels along a side or than the limits.
+pub fn read_texture(path: &Path, limits: &Limits) -> Result<Texture> {
+    let bytes = read_bytes(path, limits)?;
+    decode_texture(&bytes, &path.display().to_string(), limits).map_err(|error| error.at_path(path))
 }
 
 /// Reads an image file as it is, within the limit of size.
-pub(super) fn read_bytes(path: &Path) -> Result<Vec<u8>> {
+pub(super) fn read_bytes(path: &Path, limits: &Limits) -> Result<Vec<u8>> {
     if path.is_dir() {
         return Err(Error::file("is a folder, not an image").at_path(path).remedy(ACCEPTED));
     }
-    let mut bytes = Vec::new();
-    std::fs::File::open(path)
-        .and_then(|file| file.take(MOST_BYTES + 1).read_to_end(&mut bytes))
-        .map_err(|cause| Error::system(path, cause))?;
-    if bytes.len() as u64 > MOST_BYTES {
-        return Err(Error::limit("image file of more than 2 GiB").at_path(path));
-    }
-    Ok(bytes)
+    limits.read_file(path)
 }
 
 /// Decodes an image that is in memory; `name` is for messages, and its suffix tells TGA.
 ///
 /// # Errors
 /// As [`read_texture`], without the path.
-pub fn decode_texture(bytes: &[u8], name: &str) -> Result<Texture> {
+pub fn decode_texture(bytes: &[u8], name: &str, limits: &Limits) -> Result<Texture> {
     let (width, height, texels) = match format_of(bytes, name)? {
-        ImageFormat::OpenExr => decode_exr(bytes)?,
-        format => decode_with_image(bytes, format)?,
+        ImageFormat::OpenExr => decode_exr(bytes, limits)?,
+        format => decode_with_image(bytes, format, limits)?,
     };
     if width == 0 || height == 0 {
         return Err(Error::file("the image has no texels"));
@@ -89,27 +79,27 @@ pub(super) fn format_of(bytes: &[u8], name: &str) -> Result<ImageFormat> {
 }
 
 /// Decodes any format but EXR, within the limits of size.
-pub(super) fn decode_image(bytes: &[u8], format: ImageFormat) -> Result<DynamicImage> {
+pub(super) fn decode_image(bytes: &[u8], format: ImageFormat, limits: &Limits) -> Result<DynamicImage> {
     let failed = |cause: ImageError| match cause {
-        ImageError::Limits(_) => too_large(),
+        ImageError::Limits(_) => too_large(limits),
         ImageError::Unsupported(cause) => Error::unsupported(one_line(&cause.to_string())),
         cause => Error::file(format!("cannot decode the image: {}", one_line(&cause.to_string()))),
     };
-    let mut limits = Limits::default();
-    limits.max_image_width = Some(LARGEST_SIDE);
-    limits.max_image_height = Some(LARGEST_SIDE);
-    limits.max_alloc = Some(MOST_BYTES);
+    let mut decoder_limits = image::Limits::default();
+    decoder_limits.max_image_width = Some(LARGEST_SIDE);
+    decoder_limits.max_image_height = Some(LARGEST_SIDE);
+    decoder_limits.max_alloc = Some(limits.texels.saturating_mul(Limits::BYTES_PER_TEXEL));
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
-    reader.limits(limits);
+    reader.limits(decoder_limits);
     let decoder = reader.into_decoder().map_err(failed)?;
     // Not every decoder heeds the limits.
     let (width, height) = decoder.dimensions();
-    check_size(u64::from(width), u64::from(height), decoder.total_bytes())?;
+    check_size(u64::from(width), u64::from(height), decoder.total_bytes(), limits)?;
     DynamicImage::from_decoder(decoder).map_err(failed)
 }
 
-fn decode_with_image(bytes: &[u8], format: ImageFormat) -> Result<(u32, u32, Texels)> {
-    let image = decode_image(bytes, format)?;
+fn decode_with_image(bytes: &[u8], format: ImageFormat, limits: &Limits) -> Result<(u32, u32, Texels)> {
+    let image = decode_image(bytes, format, limits)?;
     let (width, height) = (image.width(), image.height());
     let texels = match image {
         DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => {
@@ -133,18 +123,18 @@ pub(super) fn exr_failed(cause: exr::error::Error) -> Error {
 }
 
 /// Checks the sizes in the headers of an EXR file, before anything of that size is allocated.
-pub(super) fn check_exr(bytes: &[u8]) -> Result<()> {
+pub(super) fn check_exr(bytes: &[u8], limits: &Limits) -> Result<()> {
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(exr_failed)?;
     for header in &meta.headers {
         let (width, height) = (header.layer_size.x() as u64, header.layer_size.y() as u64);
         let channels = header.channels.list.len() as u64;
-        check_size(width, height, width.saturating_mul(height).saturating_mul(4 * channels))?;
+        check_size(width, height, width.saturating_mul(height).saturating_mul(4 * channels), limits)?;
     }
     Ok(())
 }
 
-fn decode_exr(bytes: &[u8]) -> Result<(u32, u32, Texels)> {
-    check_exr(bytes)?;
+fn decode_exr(bytes: &[u8], limits: &Limits) -> Result<(u32, u32, Texels)> {
+    check_exr(bytes, limits)?;
     let image = exr::prelude::read()
         .no_deep_data()
         .largest_resolution_level()
@@ -162,13 +152,22 @@ fn decode_exr(bytes: &[u8]) -> Result<(u32, u32, Texels)> {
     Ok((size.x() as u32, size.y() as u32, Texels::Linear32(image.layer_data.channel_data.pixels.1.into())))
 }
 
-fn check_size(width: u64, height: u64, bytes: u64) -> Result<()> {
+fn check_size(width: u64, height: u64, bytes: u64, limits: &Limits) -> Result<()> {
     let side = u64::from(LARGEST_SIDE);
-    if width > side || height > side || bytes > MOST_BYTES { Err(too_large()) } else { Ok(()) }
+    if width > side || height > side {
+        let text = format!("the image has {width}x{height} texels; {side} along a side are the most");
+        return Err(Error::limit(text).remedy("make it smaller"));
+    }
+    limits.check_texels(width, height, bytes)
 }
 
-fn too_large() -> Error {
-    Error::limit("the image is larger than 65536 texels along a side or 2 GiB decoded").remedy("make it smaller")
+/// What a decoder that ran out of its limits means; it does not tell which.
+fn too_large(limits: &Limits) -> Error {
+    let most = limits.texels;
+    Error::limit(format!(
+        "the image is larger than {LARGEST_SIDE} texels along a side or the limit of texels, which is {most}"
+    ))
+    .remedy("make it smaller, or raise the limit with `--limit texels=N`")
 }
 
 /// A float texel without NaN (it becomes 0) and infinity: one bad texel must not spread through filtering.
@@ -210,7 +209,7 @@ mod tests {
             (ImageFormat::Tga, "a.TGA"),
             (ImageFormat::Bmp, "a.jpg"),
         ] {
-            let texture = decode_texture(&encoded(&image, format), name).unwrap();
+            let texture = decode_texture(&encoded(&image, format), name, &Limits::default()).unwrap();
             assert_eq!((texture.width, texture.height), (2, 3));
             let Texels::Srgb8(texels) = &texture.texels else { panic!("{format:?}") };
             assert_eq!(texels[1], [100, 0, 7, 255], "{format:?}: right of the top row");
@@ -221,7 +220,7 @@ mod tests {
     #[test]
     fn sixteen_bits_are_rounded_to_the_nearest() {
         let image = DynamicImage::ImageRgb16(ImageBuffer::from_pixel(1, 1, Rgb([128u16, 129, 65535])));
-        let texture = decode_texture(&encoded(&image, ImageFormat::Png), "a.png").unwrap();
+        let texture = decode_texture(&encoded(&image, ImageFormat::Png), "a.png", &Limits::default()).unwrap();
         // 128 * 255 / 65535 = 0.498, 129 * 255 / 65535 = 0.502.
         assert_eq!(texture.texels, Texels::Srgb8(vec![[0, 1, 255, 255]].into()));
     }
@@ -239,14 +238,14 @@ mod tests {
         .write()
         .to_buffered(&mut bytes)
         .unwrap();
-        let texture = decode_texture(bytes.get_ref(), "a").unwrap();
+        let texture = decode_texture(bytes.get_ref(), "a", &Limits::default()).unwrap();
         assert_eq!(texture.texels, Texels::Linear32(vec![[0.1, 2.5, -1.0], [0.0, 65504.0, 1e30]].into()));
     }
 
     #[test]
     fn hdr_is_linear() {
         let image = DynamicImage::ImageRgb32F(ImageBuffer::from_pixel(8, 1, Rgb([0.5f32, 4.0, 0.25])));
-        let texture = decode_texture(&encoded(&image, ImageFormat::Hdr), "sky").unwrap();
+        let texture = decode_texture(&encoded(&image, ImageFormat::Hdr), "sky", &Limits::default()).unwrap();
         assert_eq!(texture.texels, Texels::Linear32(vec![[0.5, 4.0, 0.25]; 8].into()));
     }
 
@@ -258,7 +257,7 @@ mod tests {
         png[16..24].copy_from_slice(&[0, 0, 0xff, 0xff, 0, 0, 0xff, 0xff]);
         let checksum = crc32(&png[12..29]);
         png[29..33].copy_from_slice(&checksum.to_be_bytes());
-        assert_eq!(decode_texture(&png, "a.png").unwrap_err().fault(), Fault::Limit);
+        assert_eq!(decode_texture(&png, "a.png", &Limits::default()).unwrap_err().fault(), Fault::Limit);
     }
 
     /// The checksum of PNG, bit by bit.
@@ -270,14 +269,14 @@ mod tests {
 
     #[test]
     fn bad_files_are_named_errors() {
-        let message = |bytes: &[u8], name| decode_texture(bytes, name).unwrap_err().to_string();
+        let message = |bytes: &[u8], name| decode_texture(bytes, name, &Limits::default()).unwrap_err().to_string();
         assert!(message(b"", "a.png").starts_with("the image file is empty; accepted are PNG"));
         assert!(message(b"hello", "a.png").starts_with("not an image of a known format"));
         assert!(message(b"GIF89a...", "a.gif").starts_with("GIF images are not supported"));
         let mut cut = encoded(&DynamicImage::new_rgb8(9, 9), ImageFormat::Png);
         cut.truncate(40);
         assert!(message(&cut, "a.png").starts_with("cannot decode the image"));
-        let missing = read_texture(Path::new("no/such.png")).unwrap_err();
+        let missing = read_texture(Path::new("no/such.png"), &Limits::default()).unwrap_err();
         assert_eq!((missing.fault(), missing.path()), (Fault::System, Some(Path::new("no/such.png"))));
     }
 }

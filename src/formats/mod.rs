@@ -11,6 +11,7 @@ pub mod picture;
 pub mod reach;
 mod rounding;
 pub mod scene_file;
+mod surroundings;
 
 use std::io::Read as _;
 use std::path::Path;

@@ -10,7 +10,8 @@ use ::gltf::json::{Index, Root, buffer};
 use super::document::missing_extension;
 use super::uri::{self, Target};
 use crate::error::{Error, Fault, Result};
-use crate::formats::Ledger;
+use crate::formats::surroundings::Surroundings;
+use crate::formats::{Ledger, Limits};
 
 /// Extensions whose views have uncompressed bytes only where the file was made to have them.
 const MESHOPT: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
@@ -27,7 +28,12 @@ impl<'a> Buffers<'a> {
     ///
     /// # Errors
     /// A file's error that names the buffer, where its source is missing or shorter than it says.
-    pub fn read(root: &Root, binary: Option<&'a [u8]>, folder: &Path, ledger: &mut Ledger) -> Result<Self> {
+    pub fn read(
+        root: &Root,
+        binary: Option<&'a [u8]>,
+        surroundings: &Surroundings,
+        ledger: &mut Ledger,
+    ) -> Result<Self> {
         let mut bytes = Vec::new();
         for (number, buffer) in root.buffers.iter().enumerate() {
             let in_buffer = |error: Error| {
@@ -36,11 +42,11 @@ impl<'a> Buffers<'a> {
             let length = usize::try_from(buffer.byte_length.0)
                 .map_err(|_| in_buffer(Error::limit(format!("{} bytes are too many", buffer.byte_length.0))))?;
             let source = match (&buffer.uri, binary) {
-                (Some(uri), _) => match uri::resolve(uri, folder).map_err(in_buffer)? {
+                (Some(uri), _) => match uri::resolve(uri, surroundings).map_err(in_buffer)? {
                     Target::Data(bytes) => Cow::Owned(bytes),
                     Target::File(path) => {
                         ledger.note_file(&path);
-                        Cow::Owned(read_exactly(&path, length).map_err(in_buffer)?)
+                        Cow::Owned(read_exactly(&path, length, &surroundings.limits).map_err(in_buffer)?)
                     }
                 },
                 (None, Some(binary)) if number == 0 => Cow::Borrowed(binary),
@@ -103,7 +109,7 @@ impl<'a> Buffers<'a> {
 /// The first `length` bytes of a file, or all it has if it has fewer.
 ///
 /// Only regular files are read: a device or pipe may never end.
-fn read_exactly(path: &Path, length: usize) -> Result<Vec<u8>> {
+fn read_exactly(path: &Path, length: usize, limits: &Limits) -> Result<Vec<u8>> {
     let failed = |error: io::Error| {
         let fault = if error.kind() == io::ErrorKind::NotFound { Fault::File } else { Fault::System };
         Error::new(fault, format!("`{}`: {error}", path.display()))
@@ -113,6 +119,7 @@ fn read_exactly(path: &Path, length: usize) -> Result<Vec<u8>> {
     if !metadata.is_file() {
         return Err(Error::file(format!("`{}` is not a file", path.display())));
     }
+    limits.check_file_bytes(metadata.len()).map_err(|error| error.within(format_args!("`{}`", path.display())))?;
     let mut bytes = Vec::new();
     let size = usize::try_from(metadata.len()).unwrap_or(usize::MAX).min(length);
     bytes.try_reserve_exact(size).map_err(|_| Error::limit(format!("not enough memory for {size} bytes")))?;

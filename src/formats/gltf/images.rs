@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 use std::collections::{BTreeSet, HashMap};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use ::gltf::json::texture::{MagFilter, MinFilter, WrappingMode};
 use ::gltf::json::validation::Checked;
@@ -14,7 +14,8 @@ use super::buffers::Buffers;
 use super::uri::{self, Target};
 use crate::error::{Error, Result};
 use crate::formats::image_file::{decode_texture, read_texture};
-use crate::formats::{Ledger, Treatment};
+use crate::formats::surroundings::Surroundings;
+use crate::formats::{Ledger, Limits, Treatment};
 use crate::scene::texture::{Filter, Texels, Wrap, srgb_to_linear};
 use crate::scene::{Rgb, Texture, TextureRef};
 
@@ -47,15 +48,15 @@ impl<'a> Textures<'a> {
     pub fn decode(
         root: &'a Root,
         buffers: &Buffers,
-        folder: &Path,
+        surroundings: &Surroundings,
         wanted: impl Iterator<Item = Index<json::Texture>>,
         ledger: &mut Ledger,
     ) -> Self {
         let numbers: BTreeSet<usize> = wanted.filter_map(|texture| image_of(root, texture)).collect();
         let numbers: Vec<usize> = numbers.into_iter().collect();
         let read = |&number: &usize| -> (Option<PathBuf>, Result<Texture>) {
-            match find(root, buffers, folder, number) {
-                Ok(source) => (source.path(), source.decode(&image_name(root, number))),
+            match find(root, buffers, surroundings, number) {
+                Ok(source) => (source.path(), source.decode(&image_name(root, number), &surroundings.limits)),
                 Err(error) => (None, Err(error)),
             }
         };
@@ -122,10 +123,10 @@ enum Source<'a> {
     Data(Cow<'a, [u8]>),
 }
 
-fn find<'a>(root: &Root, buffers: &'a Buffers, folder: &Path, number: usize) -> Result<Source<'a>> {
+fn find<'a>(root: &Root, buffers: &'a Buffers, surroundings: &Surroundings, number: usize) -> Result<Source<'a>> {
     let image = &root.images[number];
     match (&image.uri, image.buffer_view) {
-        (Some(uri), _) => match uri::resolve(uri, folder)? {
+        (Some(uri), _) => match uri::resolve(uri, surroundings)? {
             Target::Data(bytes) => Ok(Source::Data(Cow::Owned(bytes))),
             // A device or pipe may never end.
             Target::File(path) if path.is_file() => Ok(Source::File(path)),
@@ -144,10 +145,10 @@ impl Source<'_> {
         }
     }
 
-    fn decode(&self, name: &str) -> Result<Texture> {
+    fn decode(&self, name: &str, limits: &Limits) -> Result<Texture> {
         match self {
-            Self::File(path) => read_texture(path),
-            Self::Data(bytes) => decode_texture(bytes, name),
+            Self::File(path) => read_texture(path, limits),
+            Self::Data(bytes) => decode_texture(bytes, name, limits),
         }
     }
 }

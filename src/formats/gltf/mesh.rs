@@ -102,7 +102,7 @@ impl MeshReader<'_> {
             used
         });
         let vertex_count = selection.as_ref().map_or(positions.count(), Vec::len);
-        budget.take::<[f32; 8]>(vertex_count)?;
+        budget.take_vertices(vertex_count)?;
         let first = builder.positions.len();
         u32::try_from(first + vertex_count).map_err(|_| Error::limit("more than 4294967295 vertices in a mesh"))?;
         let vertex = |corner: usize| -> u32 {

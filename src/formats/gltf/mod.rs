@@ -31,7 +31,8 @@ use std::path::Path;
 
 use ::gltf::json::Root;
 
-use crate::error::{Error, Result};
+use crate::error::Result;
+use crate::formats::surroundings::Surroundings;
 use crate::formats::{Ledger, LoadOptions, Model, Treatment};
 use crate::geometry::TriangleMesh;
 use crate::math::Transform;
@@ -58,7 +59,7 @@ use nodes::PlacedNode;
 /// Each names the file and, where there is one, the place in the JSON: a file's error for what is malformed, missing or
 /// out of bounds; unsupported for required extensions that are not read; a limit for what does not fit memory.
 pub fn load(path: &Path, options: &LoadOptions, progress: &dyn Progress) -> Result<Model> {
-    let file = std::fs::read(path).map_err(|error| Error::system(path, error))?;
+    let file = options.limits.read_file(path)?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut model = read(&file, folder, options, progress).map_err(|error| error.at_path(path))?;
     model.ledger.note_file(path);
@@ -66,19 +67,23 @@ pub fn load(path: &Path, options: &LoadOptions, progress: &dyn Progress) -> Resu
 }
 
 /// Reads a file that is in memory; `folder` is where its relative URIs start from.
-fn read(file: &[u8], folder: &Path, options: &LoadOptions, progress: &dyn Progress) -> Result<Model> {
+///
+/// # Errors
+/// As [`load`], without the path.
+pub fn read(file: &[u8], folder: &Path, options: &LoadOptions, progress: &dyn Progress) -> Result<Model> {
     let mut ledger = Ledger::default();
     let container = Container::split(file)?;
     let document = Document::parse(container.json, &mut ledger)?;
     let root = &document.root;
-    let buffers = Buffers::read(root, container.binary, folder, &mut ledger)?;
-    let placed = nodes::place(&document, options.up, &mut ledger)?;
+    let surroundings = Surroundings::new(folder, options);
+    let buffers = Buffers::read(root, container.binary, &surroundings, &mut ledger)?;
+    let placed = nodes::place(&document, options.up, &options.limits, &mut ledger)?;
     note_unread_parts(root, &placed, &mut ledger);
     progress.check()?;
 
     let mut model = Model::default();
     let wanted = root.materials.iter().flat_map(material::textures_of);
-    let mut textures = Textures::decode(root, &buffers, folder, wanted, &mut ledger);
+    let mut textures = Textures::decode(root, &buffers, &surroundings, wanted, &mut ledger);
     progress.check()?;
     let mut materials = MaterialReader {
         textures: &mut textures,
@@ -95,7 +100,7 @@ fn read(file: &[u8], folder: &Path, options: &LoadOptions, progress: &dyn Progre
     }
     model.textures = textures.into_textures();
 
-    let mut budget = Budget::new(file.len() as u64 + buffers.total_bytes());
+    let mut budget = Budget::new(file.len() as u64 + buffers.total_bytes(), options.limits);
     let reader = MeshReader {
         root,
         buffers: &buffers,

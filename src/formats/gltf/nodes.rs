@@ -5,7 +5,7 @@ use glam::{DAffine3, DMat3, DVec3, DVec4};
 
 use super::document::{Document, Placement};
 use crate::error::{Error, Result};
-use crate::formats::{Ledger, Treatment, UpAxis};
+use crate::formats::{Ledger, Limits, Treatment, UpAxis};
 use crate::math::transform::{compose, rotation_by};
 
 /// A node of the scene with its place in the world.
@@ -30,23 +30,29 @@ impl PlacedNode<'_> {
 /// the order of the file's lists.
 ///
 /// # Errors
-/// A file's error that names a node which has two parents or is its own ancestor.
-pub(super) fn place<'a>(document: &'a Document, up: UpAxis, ledger: &mut Ledger) -> Result<Vec<PlacedNode<'a>>> {
+/// A file's error that names a node which has two parents or is its own ancestor; a limit for one too deep.
+pub(super) fn place<'a>(
+    document: &'a Document,
+    up: UpAxis,
+    limits: &Limits,
+    ledger: &mut Ledger,
+) -> Result<Vec<PlacedNode<'a>>> {
     let root = &document.root;
     let mut seen = vec![false; root.nodes.len()];
     let mut placed = Vec::with_capacity(root.nodes.len());
     // A stack of our own: a hierarchy may be deeper than the program's.
-    let mut waiting: Vec<(Index<Node>, DAffine3)> =
-        roots(root).into_iter().rev().map(|node| (node, up.to_y())).collect();
-    while let Some((index, parent)) = waiting.pop() {
+    let mut waiting: Vec<(Index<Node>, DAffine3, u64)> =
+        roots(root).into_iter().rev().map(|node| (node, up.to_y(), 0)).collect();
+    while let Some((index, parent, depth)) = waiting.pop() {
         let number = index.value();
+        limits.check_depth(depth).map_err(|error| error.within(format_args!("nodes[{number}]")))?;
         if std::mem::replace(&mut seen[number], true) {
             let text = format!("nodes[{number}] has two parents, or is its own ancestor");
             return Err(Error::file(text).remedy("glTF wants a tree: export the file again"));
         }
         let (node, placement) = (&root.nodes[number], &document.placements[number]);
         let to_world = compose(&parent, &local(placement, ledger));
-        waiting.extend(node.children.iter().flatten().rev().map(|&child| (child, to_world)));
+        waiting.extend(node.children.iter().flatten().rev().map(|&child| (child, to_world, depth + 1)));
         placed.push(PlacedNode { number, node, to_world });
     }
     Ok(placed)

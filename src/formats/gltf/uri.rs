@@ -1,8 +1,9 @@
 //! What a `uri` points to: bytes within the URI itself (RFC 2397), or a file beside the model (RFC 3986).
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use crate::error::{Error, Result};
+use crate::formats::surroundings::Surroundings;
 
 /// A URI, read.
 #[derive(Debug, PartialEq)]
@@ -13,16 +14,19 @@ pub(super) enum Target {
     File(PathBuf),
 }
 
-/// Reads a URI of a model in `folder`.
+/// Reads a URI of a model.
 ///
 /// # Errors
-/// A file's error for data that is not valid base64 or percent encoding; unsupported for other schemes, such as `http:`.
-pub(super) fn resolve(uri: &str, folder: &Path) -> Result<Target> {
+/// A file's error for data that is not valid base64 or percent encoding; unsupported for other schemes, such as `http:`; a
+/// limit for too much data; a file's error for a file that the model must not read.
+pub(super) fn resolve(uri: &str, surroundings: &Surroundings) -> Result<Target> {
     if let Some(data) = strip_scheme(uri, "data") {
         let (media_type, payload) =
             data.split_once(',').ok_or_else(|| Error::file("the data URI has no comma before its data"))?;
-        let bytes = percent_decode(payload)?;
         let is_base64 = media_type.rsplit(';').next().is_some_and(|last| last.trim().eq_ignore_ascii_case("base64"));
+        let length = payload.len() as u64;
+        surroundings.limits.check_data_uri_bytes(if is_base64 { length / 4 * 3 } else { length })?;
+        let bytes = percent_decode(payload)?;
         return Ok(Target::Data(if is_base64 { base64_decode(&bytes)? } else { bytes }));
     }
     if let Some(scheme) = scheme(uri) {
@@ -32,8 +36,9 @@ pub(super) fn resolve(uri: &str, folder: &Path) -> Result<Target> {
     let name = String::from_utf8(percent_decode(uri)?)
         .map_err(|_| Error::file(format!("the URI `{uri}` is not UTF-8 once decoded")))?;
     // Some exporters write Windows paths; a file that really has the backslash in its name goes first.
-    let path = folder.join(&name);
-    let portable = folder.join(name.replace('\\', "/"));
+    let path = surroundings.folder.join(&name);
+    let portable = surroundings.folder.join(name.replace('\\', "/"));
+    surroundings.check(&portable, &name)?;
     Ok(Target::File(if path.exists() { path } else { portable }))
 }
 
@@ -110,6 +115,12 @@ fn base64_decode(text: &[u8]) -> Result<Vec<u8>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::formats::{Limits, LoadOptions};
+    use std::path::Path;
+
+    fn resolve(uri: &str, folder: &Path) -> Result<Target> {
+        super::resolve(uri, &Surroundings::new(folder, &LoadOptions::default()))
+    }
 
     fn data(uri: &str) -> Vec<u8> {
         match resolve(uri, Path::new("folder")).unwrap() {
@@ -147,5 +158,24 @@ mod tests {
         assert_eq!(data("DATA:,a%41"), b"aA");
         assert!(resolve("https://example.org/a.bin", Path::new("")).is_err());
         assert!(resolve("data:application/octet-stream;base64", Path::new("")).is_err());
+    }
+
+    #[test]
+    fn files_elsewhere_are_refused_unless_allowed() {
+        for uri in ["../a.bin", "%2e%2e/a.bin", "..\\a.bin", "/etc/a.bin", "b/../../a.bin"] {
+            let error = resolve(uri, Path::new("folder")).unwrap_err();
+            assert!(error.to_string().contains("--allow-external"), "{uri}: {error}");
+            let options = LoadOptions { allow_external: true, ..Default::default() };
+            assert!(super::resolve(uri, &Surroundings::new(Path::new("folder"), &options)).is_ok(), "{uri}");
+        }
+    }
+
+    #[test]
+    fn data_beyond_the_limit_is_not_decoded() {
+        let limits = Limits { data_uri_bytes: 6, ..Limits::default() };
+        let surroundings = Surroundings { limits, ..Default::default() };
+        assert!(super::resolve("data:;base64,Zm9vYmFy", &surroundings).is_ok());
+        let error = super::resolve("data:;base64,Zm9vYmFyZm9v", &surroundings).unwrap_err();
+        assert!(error.to_string().ends_with("raise it with `--limit data-uri-bytes=9`"), "{error}");
     }
 }

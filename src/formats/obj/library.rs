@@ -4,15 +4,16 @@
 //! fewer than three numbers. It gets only statements that it can read and that are used here; all others are
 //! written down with their lines.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
-use super::find_file::find_file;
+use super::find_file::{absence, find_file};
 use super::lines::{Lines, Statement};
 use crate::error::{Error, Result};
-use crate::formats::{Ledger, Treatment};
+use crate::formats::surroundings::Surroundings;
+use crate::formats::{Ledger, Limits, Treatment};
 
 /// The materials of all libraries that a file names.
 #[derive(Default)]
@@ -34,22 +35,28 @@ pub(super) struct Definition {
 }
 
 impl Libraries {
-    /// Reads the libraries that `mtllib` statements name, relative to `folder`. What is wrong with them becomes
-    /// warnings: a picture in neutral colours is better than none.
-    pub fn read(folder: &Path, statements: &[(String, usize)], ledger: &mut Ledger) -> Self {
+    /// Reads the libraries that `mtllib` statements name, relative to the model's folder, each once. What is wrong with them
+    /// becomes warnings: a picture in neutral colours is better than none.
+    pub fn read(surroundings: &Surroundings, statements: &[(String, usize)], ledger: &mut Ledger) -> Self {
+        let folder = &surroundings.folder;
         let mut libraries = Self::default();
+        let mut known = HashSet::new();
         for (names, line) in statements {
             let names = names.replace("\\ ", " ");
-            let whole = find_file(folder, &names);
+            let whole = find_file(folder, &names, surroundings);
             let pieces = if whole.is_some() { vec![names.as_str()] } else { split_names(&names) };
             for name in pieces {
-                let Some(path) = find_file(folder, name) else {
-                    let warning = format!("material library `{name}` is missing (line {line}): neutral material used");
+                let Some(path) = find_file(folder, name, surroundings) else {
+                    let why = absence(folder, name, surroundings);
+                    let warning = format!("material library `{name}` {why} (line {line}): neutral material used");
                     ledger.note(Treatment::Warning, warning, 1);
                     libraries.incomplete = true;
                     continue;
                 };
-                if let Err(error) = libraries.read_file(&path, ledger) {
+                if !known.insert(path.clone()) {
+                    continue;
+                }
+                if let Err(error) = libraries.read_file(&path, &surroundings.limits, ledger) {
                     ledger.note(Treatment::Warning, error.to_string(), 1);
                     libraries.incomplete = true;
                 }
@@ -63,9 +70,11 @@ impl Libraries {
         self.definitions.get(name)
     }
 
-    fn read_file(&mut self, path: &Path, ledger: &mut Ledger) -> Result<()> {
+    fn read_file(&mut self, path: &Path, limits: &Limits, ledger: &mut Ledger) -> Result<()> {
         ledger.note_file(path);
-        let file = File::open(path).map_err(|cause| Error::system(path, cause))?;
+        let system = |cause| Error::system(path, cause);
+        let file = File::open(path).map_err(system)?;
+        limits.check_file_bytes(file.metadata().map_err(system)?.len()).map_err(|error| error.at_path(path))?;
         let (text, statements) = clean(path, BufReader::new(file), ledger)?;
         let (materials, _) =
             tobj::load_mtl_buf(&mut text.as_bytes()).map_err(|cause| Error::file(cause.to_string()).at_path(path))?;
@@ -210,7 +219,11 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("a.mtl"), text).unwrap();
         let mut ledger = Ledger::default();
-        let libraries = Libraries::read(folder.path(), &[("a.mtl".into(), 1)], &mut ledger);
+        let libraries = Libraries::read(
+            &Surroundings::new(folder.path(), &Default::default()),
+            &[("a.mtl".into(), 1)],
+            &mut ledger,
+        );
         let ignored =
             |(treatment, text): &(Treatment, String)| (*treatment == Treatment::Ignored).then(|| text.clone());
         let of_a = libraries.get("a").into_iter().flat_map(|definition| &definition.statements).filter_map(ignored);

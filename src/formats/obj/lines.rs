@@ -1,9 +1,13 @@
 //! The reader under OBJ and MTL files: statements with their line numbers, cleaned of everything that is layout.
 
-use std::io::BufRead;
+use std::io::{BufRead, Read};
 use std::path::Path;
 
 use crate::error::{Error, Result};
+
+/// The longest statement with its continuations, in bytes: a face of some six million corners. What is longer is no OBJ file,
+/// and would be read into memory as a whole.
+const MOST_BYTES: usize = 64 << 20;
 
 /// Reads statements one by one into one buffer that is used again.
 ///
@@ -44,19 +48,25 @@ impl<'a, R: BufRead> Lines<'a, R> {
     /// The next statement, or `None` at the end.
     ///
     /// # Errors
-    /// A system's error where reading fails; a file's error with its line for text that is not UTF-8.
+    /// A system's error where reading fails; a file's error with its line for text that is not UTF-8; a limit for a statement
+    /// of more than 64 MiB.
     pub fn read(&mut self) -> Result<Option<Statement<'_>>> {
         self.text.clear();
         let mut first_line = None;
         loop {
             let start = self.text.len();
-            let count =
-                self.reader.read_until(b'\n', &mut self.text).map_err(|cause| Error::system(self.path, cause))?;
+            // One byte more than fits tells that there is more.
+            let mut reader = self.reader.by_ref().take((MOST_BYTES + 1 - start) as u64);
+            let count = reader.read_until(b'\n', &mut self.text).map_err(|cause| Error::system(self.path, cause))?;
             if count == 0 {
                 break;
             }
             self.line += 1;
             self.bytes += count as u64;
+            if self.text.len() > MOST_BYTES {
+                let error = Error::limit("the statement is longer than 64 MiB").remedy("is this an OBJ or MTL file?");
+                return Err(error.at_path(self.path).at_line(first_line.unwrap_or(self.line)));
+            }
             if self.line == 1 {
                 self.check_encoding()?;
             }
@@ -175,6 +185,35 @@ mod tests {
             b"usemtl Material #25\nusemtl a#b # c\nmap_Kd x#1.png",
             &[(1, "usemtl", "Material #25"), (2, "usemtl", "a#b"), (3, "map_Kd", "x#1.png")],
         );
+    }
+
+    #[test]
+    fn statements_of_absurd_length_are_a_limit() {
+        let endless = |line: &'static [u8]| {
+            let reader = std::io::BufReader::new(b"v 1\n".chain(Cycle { line, at: 0 }));
+            let mut lines = Lines::new(Path::new("a.obj"), reader);
+            assert!(lines.read().unwrap().is_some());
+            lines.read().unwrap_err().to_string()
+        };
+        let expected = "a.obj:2: the statement is longer than 64 MiB; is this an OBJ or MTL file?";
+        assert_eq!(endless(b"f 1 2 3 "), expected);
+        assert_eq!(endless(b"f 1 2 3 \\\n"), expected);
+    }
+
+    /// The same bytes over and over.
+    struct Cycle {
+        line: &'static [u8],
+        at: usize,
+    }
+
+    impl Read for Cycle {
+        fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
+            for byte in bytes.iter_mut() {
+                *byte = self.line[self.at];
+                self.at = (self.at + 1) % self.line.len();
+            }
+            Ok(bytes.len())
+        }
     }
 
     #[test]

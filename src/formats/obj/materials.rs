@@ -5,6 +5,7 @@ use glam::Vec4;
 use super::library::{Definition, Libraries};
 use super::mtl::{self, Phong};
 use super::textures::{Map, Textures};
+use crate::formats::surroundings::Surroundings;
 use crate::formats::{Ledger, Scope, Treatment};
 use crate::scene::detail::{Alpha, AlphaMode, Channel, Detail, MetallicRoughness, NormalMap, Rule};
 use crate::scene::{Material, Rgb, Texture, TextureRef};
@@ -16,6 +17,7 @@ use super::texels::{has_varying_alpha, shows_normals};
 pub(super) fn read(
     names: &[Option<String>],
     libraries: &Libraries,
+    surroundings: Surroundings,
     has_colors: bool,
     ledger: &mut Ledger,
 ) -> (Vec<Material>, Vec<Texture>) {
@@ -24,7 +26,7 @@ pub(super) fn read(
         let maps = maps(&definition.source).into_iter().flatten();
         maps.map(|statement| (definition.folder.as_path(), statement))
     });
-    let mut textures = Textures::decode(statements, ledger);
+    let mut textures = Textures::decode(statements, surroundings, ledger);
     let mut materials = Vec::with_capacity(names.len());
     for name in names {
         let number = materials.len() as u32;

@@ -34,10 +34,11 @@ mod textures;
 mod triangulate;
 
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 use crate::error::{Error, Result};
+use crate::formats::surroundings::Surroundings;
 use crate::formats::{Ledger, LoadOptions, Model, NormalMode, Scope, Treatment, rounding};
 use crate::progress::Progress;
 use crate::scene::{Material, Object, Shape};
@@ -56,11 +57,24 @@ const BYTES_PER_STEP: u64 = 1 << 20;
 /// # Errors
 /// A system's error for a file that cannot be read; a file's error, with the line, for text that is not UTF-8, numbers
 /// that cannot be read and indices of 0; a file's error for a file without faces; a limit for more than 4294967294
-/// vertices or corners; cancellation.
+/// vertices or corners, or more than the options allow; cancellation.
 pub fn load(path: &Path, options: &LoadOptions, progress: &dyn Progress) -> Result<Model> {
+    let system = |cause| Error::system(path, cause);
+    let file = File::open(path).map_err(system)?;
+    let size = file.metadata().map_err(system)?.len();
+    options.limits.check_file_bytes(size).map_err(|error| error.at_path(path))?;
+    progress.begin("load", size);
+    read(BufReader::with_capacity(1 << 16, file), path, options, progress)
+}
+
+/// Reads an OBJ file from elsewhere that lies, or would lie, at `path`. Progress is only advanced, by bytes.
+///
+/// # Errors
+/// As [`load`].
+pub fn read(reader: impl BufRead, path: &Path, options: &LoadOptions, progress: &dyn Progress) -> Result<Model> {
     let mut ledger = Ledger::default();
     ledger.note_file(path);
-    let mut parsed = read(path, options.normals, progress)?;
+    let mut parsed = parse(reader, path, options, progress)?;
     parsed.finish(&mut ledger);
     if parsed.faces.count() == 0 {
         return Err(Error::file("the file has no faces").remedy("export it with polygons").at_path(path));
@@ -69,11 +83,13 @@ pub fn load(path: &Path, options: &LoadOptions, progress: &dyn Progress) -> Resu
     let name = path.file_stem().map_or_else(|| "mesh".into(), |stem| stem.to_string_lossy());
     let (mut mesh, material_names) =
         mesh::build(parsed, &name, options, progress, &mut ledger).map_err(|error| error.at_path(path))?;
+    options.limits.check_vertices(mesh.positions.len() as u64).map_err(|error| error.at_path(path))?;
     rounding::note(&mesh.rounding, &name, &mut ledger);
 
-    let folder = path.parent().unwrap_or(Path::new(""));
-    let libraries = Libraries::read(folder, &libraries, &mut ledger);
-    let (materials, textures) = materials::read(&material_names, &libraries, mesh.colors.is_some(), &mut ledger);
+    let surroundings = Surroundings::of(path, options);
+    let libraries = Libraries::read(&surroundings, &libraries, &mut ledger);
+    let has_colors = mesh.colors.is_some();
+    let (materials, textures) = materials::read(&material_names, &libraries, surroundings, has_colors, &mut ledger);
     if mesh.uvs.is_none() && materials.iter().any(|material| material.textures().next().is_some()) {
         let warning = "images on a mesh without texture coordinates (vt): their lower left corner used";
         ledger.note_in(Treatment::Warning, warning, Scope::Mesh(0));
@@ -87,17 +103,16 @@ pub fn load(path: &Path, options: &LoadOptions, progress: &dyn Progress) -> Resu
 }
 
 /// Reads all statements.
-fn read(path: &Path, normals: NormalMode, progress: &dyn Progress) -> Result<Parsed> {
-    let system = |cause| Error::system(path, cause);
-    let file = File::open(path).map_err(system)?;
-    progress.begin("load", file.metadata().map_err(system)?.len());
-    let mut lines = Lines::new(path, BufReader::with_capacity(1 << 16, file));
+fn parse(reader: impl BufRead, path: &Path, options: &LoadOptions, progress: &dyn Progress) -> Result<Parsed> {
+    let limits = &options.limits;
+    let mut lines = Lines::new(path, reader);
     // Corners that differ in their normal alone are one vertex where the file's normals are not wanted.
-    let mut parsed = if normals == NormalMode::File { Parsed::default() } else { Parsed::without_normals() };
+    let mut parsed = if options.normals == NormalMode::File { Parsed::default() } else { Parsed::without_normals() };
     let mut reported = 0;
     while let Some(statement) = lines.read()? {
         let line = statement.line;
-        parsed.statement(statement).map_err(|error| error.at_path(path).at_line(line))?;
+        let taken = parsed.statement(statement).and_then(|()| limits.check_vertices(parsed.positions.len() as u64));
+        taken.map_err(|error| error.at_path(path).at_line(line))?;
         if lines.bytes() - reported >= BYTES_PER_STEP {
             progress.advance(lines.bytes() - reported);
             reported = lines.bytes();

@@ -6,10 +6,11 @@ use std::path::{Path, PathBuf};
 use glam::{DVec2, Vec4};
 use rayon::prelude::*;
 
-use super::find_file::find_file;
+use super::find_file::{absence, find_file};
 use super::maps::MapStatement;
 use super::texels;
 use crate::formats::image_file::read_texture;
+use crate::formats::surroundings::Surroundings;
 use crate::formats::{Ledger, Treatment};
 use crate::scene::detail::Channel;
 use crate::scene::texture::Wrap;
@@ -18,6 +19,7 @@ use crate::scene::{Texture, TextureRef};
 /// The images and textures of a model.
 #[derive(Default)]
 pub(super) struct Textures {
+    surroundings: Surroundings,
     /// As decoded; `None` for an image that could not be read.
     images: HashMap<PathBuf, Option<Texture>>,
     /// What materials refer to, in the order of first use.
@@ -54,25 +56,30 @@ type Source = (PathBuf, [u64; 2]);
 
 impl Textures {
     /// Decodes the images of statements, each seen from a folder, on all threads. What is missing is told when it is asked for.
-    pub fn decode<'a>(statements: impl Iterator<Item = (&'a Path, &'a str)>, ledger: &mut Ledger) -> Self {
-        let find = |(folder, statement)| find_file(folder, MapStatement::parse(statement).file);
+    pub fn decode<'a>(
+        statements: impl Iterator<Item = (&'a Path, &'a str)>,
+        surroundings: Surroundings,
+        ledger: &mut Ledger,
+    ) -> Self {
+        let find = |(folder, statement)| find_file(folder, MapStatement::parse(statement).file, &surroundings);
         let paths: BTreeSet<PathBuf> = statements.filter_map(find).collect();
         let paths: Vec<PathBuf> = paths.into_iter().collect();
-        let outcomes: Vec<_> = paths.par_iter().map(|path| read_texture(path)).collect();
+        let outcomes: Vec<_> = paths.par_iter().map(|path| read_texture(path, &surroundings.limits)).collect();
         let mut images = HashMap::new();
         for (path, outcome) in paths.into_iter().zip(outcomes) {
             ledger.note_file(&path);
             let warn = |error| ledger.note(Treatment::Warning, format!("{error}: plain colour used"), 1);
             images.insert(path, outcome.map_err(warn).ok());
         }
-        Self { images, ..Self::default() }
+        Self { surroundings, images, ..Self::default() }
     }
 
     /// The map of a statement; `None`, with a warning, for an image that is missing or could not be read.
     pub fn map<'a>(&self, folder: &Path, statement: &'a str, ledger: &mut Ledger) -> Option<Map<'a>> {
         let statement = MapStatement::parse(statement);
-        let Some(path) = find_file(folder, statement.file) else {
-            let warning = format!("texture `{}` is missing: plain colour used", statement.file);
+        let Some(path) = find_file(folder, statement.file, &self.surroundings) else {
+            let why = absence(folder, statement.file, &self.surroundings);
+            let warning = format!("texture `{}` {why}: plain colour used", statement.file);
             ledger.note(Treatment::Warning, warning, 1);
             return None;
         };
@@ -191,6 +198,10 @@ fn channel_of(number: u8) -> Channel {
 mod tests {
     use super::*;
 
+    fn here(folder: &tempfile::TempDir) -> Surroundings {
+        Surroundings::new(folder.path(), &Default::default())
+    }
+
     #[test]
     fn an_image_is_decoded_once() {
         let folder = tempfile::tempdir().unwrap();
@@ -198,7 +209,8 @@ mod tests {
         std::fs::write(folder.path().join("bad.png"), "x").unwrap();
         let statements = ["a.png", "-clamp on A.png", "-s 2 2 .\\a.png", "bad.png", "-clamp on bad.png", "none.png"];
         let mut ledger = Ledger::default();
-        let mut textures = Textures::decode(statements.iter().map(|&text| (folder.path(), text)), &mut ledger);
+        let mut textures =
+            Textures::decode(statements.iter().map(|&text| (folder.path(), text)), here(&folder), &mut ledger);
         let mut get = |statement| {
             let map = textures.map(folder.path(), statement, &mut ledger)?;
             Some(textures.color(&map, false).texture)
@@ -218,7 +230,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         image::RgbImage::new(4, 4).save(folder.path().join("a.png")).unwrap();
         let mut ledger = Ledger::default();
-        let mut textures = Textures::decode([(folder.path(), "a.png")].into_iter(), &mut ledger);
+        let mut textures = Textures::decode([(folder.path(), "a.png")].into_iter(), here(&folder), &mut ledger);
         let map = textures.map(folder.path(), "a.png", &mut ledger).unwrap();
         let refs = [textures.color(&map, false), textures.data(&map), textures.normals_of_heights(&map)];
         assert_eq!(refs.map(|texture| texture.texture), [0, 1, 2]);

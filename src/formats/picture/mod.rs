@@ -176,6 +176,7 @@ fn exr_error(cause: exr::error::Error) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::formats::Limits;
     use crate::formats::image_file::read_texture;
     use crate::render::{Aov, AovKind, RenderStats};
     use crate::scene::FilmSettings;
@@ -293,7 +294,7 @@ mod tests {
         assert_eq!(samples("normal.Z"), bits(&film.aovs[2].channels[2]));
         assert_eq!(samples("A"), bits(film.alpha.as_ref().unwrap()));
         assert_eq!(samples("B"), bits(&film.color.iter().map(|color| color[2]).collect::<Vec<_>>()));
-        let Texels::Linear32(texels) = read_texture(&path).unwrap().texels else { panic!() };
+        let Texels::Linear32(texels) = read_texture(&path, &Limits::default()).unwrap().texels else { panic!() };
         assert_eq!(texels[5], film.color[5], "other readers find the colour");
     }
 

@@ -10,6 +10,7 @@ use exr::prelude::{FlatSamples, ReadChannels as _, ReadLayers as _};
 use image::{DynamicImage, ImageFormat};
 
 use crate::error::{Error, Result};
+use crate::formats::Limits;
 use crate::formats::image_file::{check_exr, decode_image, exr_failed, format_of, read_bytes};
 use crate::scene::texture::srgb_to_linear;
 
@@ -90,11 +91,12 @@ impl StoredPicture {
     /// Names the file and the cause: it cannot be read, is no picture, is malformed, is larger than 65536 pixels along
     /// a side or 2 GiB, or is an EXR file without colour.
     pub fn read(path: &Path) -> Result<Self> {
-        let bytes = read_bytes(path)?;
+        let limits = Limits::default();
+        let bytes = read_bytes(path, &limits)?;
         let name = path.display().to_string();
         let decode = || match format_of(&bytes, &name)? {
             ImageFormat::OpenExr => Self::from_exr(&bytes),
-            format => Ok(Self::from_image(&decode_image(&bytes, format)?)),
+            format => Ok(Self::from_image(&decode_image(&bytes, format, &limits)?)),
         };
         decode().map_err(|error| error.at_path(path))
     }
@@ -119,7 +121,7 @@ impl StoredPicture {
     }
 
     fn from_exr(bytes: &[u8]) -> Result<Self> {
-        check_exr(bytes)?;
+        check_exr(bytes, &Limits::default())?;
         let image = exr::prelude::read()
             .no_deep_data()
             .largest_resolution_level()

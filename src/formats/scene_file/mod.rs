@@ -15,5 +15,5 @@ mod value;
 mod view;
 mod write;
 
-pub use read::read;
+pub use read::{parse, read};
 pub use write::save_model_scene;

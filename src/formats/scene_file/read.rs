@@ -43,7 +43,10 @@ pub fn read(path: &Path, options: &LoadOptions, progress: &dyn Progress) -> Resu
 }
 
 /// Reads the text of a scene file that lies, or would lie, at `path`.
-pub(super) fn parse(text: &str, path: &Path, options: &LoadOptions, progress: &dyn Progress) -> Result<Loaded> {
+///
+/// # Errors
+/// As [`read`].
+pub fn parse(text: &str, path: &Path, options: &LoadOptions, progress: &dyn Progress) -> Result<Loaded> {
     let source = Source { path, text };
     let table = DeTable::parse(text).map_err(|cause| {
         let message = cause.message().split_whitespace().collect::<Vec<_>>().join(" ");
@@ -213,7 +216,7 @@ impl Reader<'_> {
             return Ok(texture.clone());
         }
         self.ledger.note_file(&path);
-        let texture = read_texture(&path)?.with_levels();
+        let texture = read_texture(&path, &self.options.limits)?.with_levels();
         self.images.insert(key, texture.clone());
         Ok(texture)
     }
@@ -256,6 +259,8 @@ impl Reader<'_> {
         ledger.shift(self.scene.materials.len() as u32, self.scene.meshes.len() as u32);
         self.ledger.merge(ledger);
         let contents = model.append_assets(&mut self.scene);
+        let vertices = self.scene.meshes.iter().map(|mesh| mesh.positions.len() as u64).sum();
+        options.limits.check_vertices(vertices).map_err(|error| error.at_path(&path))?;
         self.extents.add_new(&self.scene);
         self.models.push((key, contents.clone()));
         Ok(contents)

@@ -52,7 +52,7 @@ fn textures_are_decoded_once_and_read_as_their_samplers_say() {
 fn images_may_lie_in_a_buffer() {
     let mut file = File::default();
     let position = file.triangle();
-    let Target::Data(png) = resolve(RED_BLACK, Path::new("")).unwrap() else { panic!() };
+    let Target::Data(png) = resolve(RED_BLACK, &Default::default()).unwrap() else { panic!() };
     let view = file.view(&png);
     let mut rest = one(json!({"attributes": {"POSITION": position}, "material": 0}));
     rest["images"] = json!([{"bufferView": view, "mimeType": "image/png"}]);
