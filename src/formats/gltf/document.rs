@@ -1,5 +1,7 @@
 //! The JSON: parsed, checked for dangling references, and for what it requires of its reader.
 
+use std::collections::BTreeMap;
+
 use ::gltf::json::validation::{self, Validate};
 use ::gltf::json::{self, Root, mesh::Semantic, validation::Checked};
 use serde::Deserialize;
@@ -8,12 +10,61 @@ use crate::error::{Error, Result};
 use crate::formats::{Ledger, Treatment};
 
 /// A file's JSON, safe to follow: every index in it that geometry, materials, nodes, cameras and lights use exists.
+/// Those of skins, animations and morph targets may dangle.
 #[derive(Debug)]
 pub(super) struct Document {
-    /// All but the placement of nodes, which the crate rounds to f32.
+    /// All but what follows.
     pub root: Root,
-    /// The placement of each node, as exact as the file has it.
+    /// The placement of each node, as exact as the file has it; the crate rounds it to f32.
     pub placements: Vec<Placement>,
+    /// The morph targets of each mesh.
+    pub targets: Vec<Vec<Targets>>,
+    /// The animations; the crate wants a node in each of their channels, which extensions leave out.
+    pub animations: Vec<Animation>,
+}
+
+/// The morph targets of a primitive: for each the numbers of its attributes' accessors by name.
+pub(super) type Targets = Vec<BTreeMap<String, serde_json::Value>>;
+
+/// Samplers, and what they move.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct Animation {
+    /// What it is called.
+    pub name: Option<String>,
+    /// Which sampler moves what.
+    pub channels: Vec<Channel>,
+    /// Values over time.
+    pub samplers: Vec<Sampler>,
+}
+
+/// What a sampler moves.
+#[derive(Debug, Clone, Deserialize)]
+pub(super) struct Channel {
+    /// Number of the sampler.
+    pub sampler: usize,
+    /// What it moves.
+    pub target: Target,
+}
+
+/// A property of a node.
+#[derive(Debug, Clone, Deserialize)]
+pub(super) struct Target {
+    /// Number of the node; `None` where an extension says what is meant.
+    pub node: Option<usize>,
+    /// `translation`, `rotation`, `scale` or `weights`.
+    pub path: String,
+}
+
+/// Accessors of times and values.
+#[derive(Debug, Clone, Deserialize)]
+pub(super) struct Sampler {
+    /// Times in seconds.
+    pub input: u32,
+    /// Values.
+    pub output: u32,
+    /// `LINEAR` if absent.
+    pub interpolation: Option<String>,
 }
 
 /// Where a node stands relative to its parent, from the JSON in f64.
@@ -52,18 +103,55 @@ impl Document {
     /// A file's error with line and column for JSON that is not glTF, or with the place of a dangling reference;
     /// unsupported for glTF 1.0 and for extensions that are required and not read.
     pub fn parse(text: &[u8], ledger: &mut Ledger) -> Result<Self> {
-        let root: Root = parse_json(text).map_err(|error| old_version(text).unwrap_or(error))?;
+        let root = parse_json(text).or_else(|error| without_animations(text).ok_or(error));
+        let root: Root = root.map_err(|error| old_version(text).unwrap_or(error))?;
         check_version(&root.asset.version)?;
         check_extensions(&root, ledger)?;
         check_references(&root, ledger)?;
-        #[derive(Deserialize)]
-        struct Placements {
-            #[serde(default)]
-            nodes: Vec<Placement>,
-        }
-        let Placements { nodes: placements } = parse_json(text)?;
-        Ok(Self { root, placements })
+        let rest: Rest = parse_json(text)?;
+        let animation = |value| {
+            serde_json::from_value(value).unwrap_or_else(|_| {
+                ledger.note(Treatment::Warning, "broken animation: nothing moves in it", 1);
+                Animation::default()
+            })
+        };
+        let of_primitive = |primitive: RestOfPrimitive| primitive.targets.unwrap_or_default();
+        let targets = rest.meshes.into_iter().map(|mesh| mesh.primitives.into_iter().map(of_primitive).collect());
+        Ok(Self {
+            root,
+            placements: rest.nodes,
+            targets: targets.collect(),
+            animations: rest.animations.into_iter().map(animation).collect(),
+        })
     }
+}
+
+/// What the crate's types do not tell.
+#[derive(Default, Deserialize)]
+#[serde(default)]
+struct Rest {
+    nodes: Vec<Placement>,
+    meshes: Vec<RestOfMesh>,
+    animations: Vec<serde_json::Value>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(default)]
+struct RestOfMesh {
+    primitives: Vec<RestOfPrimitive>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(default)]
+struct RestOfPrimitive {
+    targets: Option<Targets>,
+}
+
+/// A file that the crate reads but for its animations.
+fn without_animations(text: &[u8]) -> Option<Root> {
+    let mut value: serde_json::Value = serde_json::from_slice(text).ok()?;
+    value.as_object_mut()?.remove("animations")?;
+    serde_json::from_value(value).ok()
 }
 
 /// The error for an extension that must be understood to read the file and is not.
@@ -167,8 +255,9 @@ fn judge(path: &str, error: validation::Error) -> Verdict {
     match error {
         // Which extensions are required was checked by our own list.
         Unsupported => Verdict::Harmless,
-        _ if path.starts_with("animations") || path.starts_with("skins") => {
-            Verdict::Warning("broken animation or skin")
+        // These are checked where they are used.
+        _ if path.starts_with("animations") || path.starts_with("skins") || path.contains(".targets") => {
+            Verdict::Harmless
         }
         // The spec demands these bounds; ours come from the vertices themselves.
         _ if path.ends_with("[\"POSITION\"].min") || path.ends_with("[\"POSITION\"].max") => {

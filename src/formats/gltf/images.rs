@@ -132,7 +132,7 @@ fn find<'a>(root: &Root, buffers: &'a Buffers, surroundings: &Surroundings, numb
             Target::File(path) if path.is_file() => Ok(Source::File(path)),
             Target::File(path) => Err(Error::file(format!("`{}` is missing", path.display()))),
         },
-        (None, Some(view)) => Ok(Source::Data(Cow::Borrowed(buffers.view(root, view)?))),
+        (None, Some(view)) => Ok(Source::Data(buffers.view(root, view)?)),
         (None, None) => Err(Error::file("has neither uri nor bufferView")),
     }
 }

@@ -3,7 +3,8 @@
 use ::gltf::json::{Index, Node, Root};
 use glam::{DAffine3, DMat3, DVec3, DVec4};
 
-use super::document::{Document, Placement};
+use super::choice::choose;
+use super::document::Placement;
 use crate::error::{Error, Result};
 use crate::formats::{Ledger, Limits, Treatment, UpAxis};
 use crate::math::transform::{compose, rotation_by};
@@ -26,23 +27,23 @@ impl PlacedNode<'_> {
     }
 }
 
-/// All nodes of the default scene, or of the first, or of the file if it has no scenes; parents before children, in
-/// the order of the file's lists.
+/// All nodes of a scene, standing as `placements` says; parents before children, in the order of the file's lists.
 ///
 /// # Errors
 /// A file's error that names a node which has two parents or is its own ancestor; a limit for one too deep.
 pub(super) fn place<'a>(
-    document: &'a Document,
+    root: &'a Root,
+    placements: &[Placement],
+    scene: Option<usize>,
     up: UpAxis,
     limits: &Limits,
     ledger: &mut Ledger,
 ) -> Result<Vec<PlacedNode<'a>>> {
-    let root = &document.root;
     let mut seen = vec![false; root.nodes.len()];
     let mut placed = Vec::with_capacity(root.nodes.len());
     // A stack of our own: a hierarchy may be deeper than the program's.
     let mut waiting: Vec<(Index<Node>, DAffine3, u64)> =
-        roots(root).into_iter().rev().map(|node| (node, up.to_y(), 0)).collect();
+        roots(root, scene).into_iter().rev().map(|node| (node, up.to_y(), 0)).collect();
     while let Some((index, parent, depth)) = waiting.pop() {
         let number = index.value();
         limits.check_depth(depth).map_err(|error| error.within(format_args!("nodes[{number}]")))?;
@@ -50,7 +51,7 @@ pub(super) fn place<'a>(
             let text = format!("nodes[{number}] has two parents, or is its own ancestor");
             return Err(Error::file(text).remedy("glTF wants a tree: export the file again"));
         }
-        let (node, placement) = (&root.nodes[number], &document.placements[number]);
+        let (node, placement) = (&root.nodes[number], &placements[number]);
         let to_world = compose(&parent, &local(placement, ledger));
         waiting.extend(node.children.iter().flatten().rev().map(|&child| (child, to_world, depth + 1)));
         placed.push(PlacedNode { number, node, to_world });
@@ -58,14 +59,25 @@ pub(super) fn place<'a>(
     Ok(placed)
 }
 
-/// Where to start.
-fn roots(root: &Root) -> Vec<Index<Node>> {
-    let scene = match root.scene {
-        Some(scene) => root.scenes.get(scene.value()),
-        None => root.scenes.first(),
-    };
+/// The scene that is read: the one of this name or number; else the file's default; else its first. `None` if the file
+/// has no scenes.
+///
+/// # Errors
+/// A caller's error if there is no such scene.
+pub(super) fn scene(root: &Root, wanted: Option<&str>, ledger: &mut Ledger) -> Result<Option<usize>> {
+    let names = root.scenes.iter().map(|scene| scene.name.as_deref());
+    let chosen = wanted.map(|wanted| choose("scene", wanted, names)).transpose()?;
+    if root.scenes.len() > 1 && chosen.is_none() {
+        ledger.note(Treatment::Ignored, "other scene (see --scene)", root.scenes.len() as u64 - 1);
+    }
+    let default = root.scene.map(|scene| scene.value()).filter(|&scene| scene < root.scenes.len());
+    Ok(chosen.or(default).or((!root.scenes.is_empty()).then_some(0)))
+}
+
+/// Where to start: at the nodes of a scene, or at all that are no other's child.
+fn roots(root: &Root, scene: Option<usize>) -> Vec<Index<Node>> {
     if let Some(scene) = scene {
-        return scene.nodes.clone();
+        return root.scenes[scene].nodes.clone();
     }
     let mut is_child = vec![false; root.nodes.len()];
     for child in root.nodes.iter().flat_map(|node| node.children.iter().flatten()) {

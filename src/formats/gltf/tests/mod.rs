@@ -10,10 +10,9 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
-use super::read;
 use crate::error::Result;
 use crate::formats::{LoadOptions, Model, Treatment};
-use crate::progress::Silent;
+use crate::progress::{Progress, Silent};
 
 /// Builds a file around bytes: each array becomes a buffer view and an accessor of its own.
 #[derive(Default)]
@@ -72,6 +71,11 @@ impl File {
 fn data_uri(bytes: &[u8]) -> String {
     let hex: String = bytes.iter().map(|byte| format!("%{byte:02x}")).collect();
     format!("data:application/octet-stream,{hex}")
+}
+
+/// Reads a file that is in memory.
+fn read(file: &[u8], folder: &Path, options: &LoadOptions, progress: &dyn Progress) -> Result<Model> {
+    super::read(file, folder, options, progress)
 }
 
 fn load_json(json: &Value, options: &LoadOptions) -> Result<Model> {
