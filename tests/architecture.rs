@@ -218,3 +218,39 @@ fn unsafe_code_is_where_it_is_allowed() {
     found.sort();
     assert_eq!(found, ALLOWED);
 }
+
+/// Rows of the page about imports: what is read, and the tests that it names.
+fn rows_of_imports() -> Vec<(String, Vec<String>)> {
+    let page = include_str!("../src/manual/imports.md");
+    let rows = page.lines().filter(|line| line.starts_with("| ") && line.ends_with('|'));
+    let cells = rows.map(|row| row.trim_matches('|').split('|').map(str::trim).collect::<Vec<_>>());
+    let cells = cells.filter(|cells| cells.last() != Some(&"test"));
+    cells
+        .map(|cells| {
+            let tests = cells.last().unwrap().split('`').skip(1).step_by(2).map(str::to_owned).collect();
+            (cells[0].to_owned(), tests)
+        })
+        .collect()
+}
+
+#[test]
+fn every_row_about_imports_names_tests_that_exist() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut files = Vec::new();
+    rust_files(&root.join("src/formats"), &mut files);
+    rust_files(&root.join("tests"), &mut files);
+    let sources: Vec<String> = files.iter().map(|file| std::fs::read_to_string(file).unwrap()).collect();
+    let is_test = |name: &str| {
+        let head = format!("fn {name}()");
+        let follows = |before: &str| before.trim_end().ends_with("#[test]");
+        sources.iter().any(|source| source.match_indices(&head).any(|(at, _)| follows(&source[..at])))
+    };
+    let rows = rows_of_imports();
+    assert!(rows.len() > 60, "{} rows", rows.len());
+    for (feature, tests) in rows {
+        assert!(!tests.is_empty(), "{feature}: no test");
+        for test in tests {
+            assert!(is_test(&test), "{feature}: there is no test `{test}`");
+        }
+    }
+}

@@ -12,6 +12,10 @@ pub mod conventions {}
 #[doc = include_str!("hard_cases.md")]
 pub mod hard_cases {}
 
+/// What is read of OBJ, MTL and glTF, and the test of each.
+#[doc = include_str!("imports.md")]
+pub mod imports {}
+
 /// How materials of model files become terms of the shading formula.
 #[doc = include_str!("materials.md")]
 pub mod materials {}

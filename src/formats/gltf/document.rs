@@ -91,7 +91,7 @@ const EXTENSIONS: &[(&str, Treatment)] = &[
     ("KHR_materials_specular", Treatment::Honoured),
     ("KHR_materials_transmission", Treatment::Honoured),
     ("KHR_materials_unlit", Treatment::Honoured),
-    ("KHR_materials_volume", Treatment::Approximated),
+    ("KHR_materials_volume", Treatment::Honoured),
     ("KHR_mesh_quantization", Treatment::Honoured),
     ("KHR_texture_transform", Treatment::Honoured),
 ];
