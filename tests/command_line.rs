@@ -553,6 +553,9 @@ fn strict_fails_on_what_is_not_honoured_and_lists_it() {
         assert!(ignored.iter().any(|line| line.contains("Ka") && line.contains("2 times")), "{message}");
     }
     assert_eq!(workshop.names(), before, "nothing is written");
+    let verbose = text(&workshop.run("render model.obj --size 8x8 --spp 1 --verbose").stderr);
+    let odd = verbose.lines().find(|line| line.contains("odd")).unwrap();
+    assert!(odd.contains("1 material") && odd.contains(" pixel") && !odd.contains(" 0 pixels"), "{odd}");
 }
 
 #[test]

@@ -12,10 +12,11 @@ use super::stats_json::{Bytes, SCHEMA, Seconds, Settings, Stats, timed};
 use super::terminal::{self, Terminal};
 use super::{camera, outputs};
 use crate::error::{Error, Result};
-use crate::formats::{self, picture};
+use crate::formats::reach::PixelCounts;
+use crate::formats::{self, Ledger, picture};
 use crate::progress::Progress;
 use crate::render::{Crop, Film};
-use crate::scene::FilmSettings;
+use crate::scene::{FilmSettings, Scene};
 
 /// Renders a picture and writes all that was asked for.
 ///
@@ -42,11 +43,7 @@ pub fn run(arguments: &RenderArguments) -> Result<()> {
     (loaded, seconds.load) = timed(|| formats::open(&arguments.input, &options, &terminal));
     terminal.clear();
     let formats::Loaded { mut scene, ledger, automatic } = loaded?;
-    let told = match (arguments.quiet, arguments.verbose) {
-        (true, _) => Told::Nothing,
-        (_, true) => Told::Everything,
-        _ => Told::Warnings,
-    };
+    let told = if arguments.quiet { Told::Nothing } else { Told::Warnings };
     ledger::report(&arguments.input, &ledger, &scene, told, arguments.load.strict)?;
     outputs.refuse_inputs(ledger.files())?;
     report_time("load", seconds.load);
@@ -78,6 +75,9 @@ pub fn run(arguments: &RenderArguments) -> Result<()> {
     terminal.clear();
     let film = film?;
     report_time("render", seconds.render);
+    if arguments.verbose {
+        report_ledger(&ledger, renderer.scene(), &film);
+    }
     if !film.complete {
         return Err(save_partial(&film, &outputs, arguments.quiet));
     }
@@ -161,6 +161,15 @@ fn save_partial(film: &Film, outputs: &Outputs, quiet: bool) -> Error {
         Err(error) => terminal::report(&format!("error: {error}")),
     }
     Error::cancelled()
+}
+
+/// All that was noted while reading, with the pixels in which it is seen.
+fn report_ledger(ledger: &Ledger, scene: &Scene, film: &Film) {
+    let pixels = film.coverage.as_ref().map(|coverage| PixelCounts {
+        by_material: &coverage.materials,
+        by_mesh: &coverage.meshes,
+    });
+    ledger::lines(ledger, scene, pixels, |_| true).iter().for_each(|line| terminal::report(line));
 }
 
 fn report_rays(film: &Film, seconds: f64) {
