@@ -75,8 +75,8 @@ pub fn load(path: &Path, options: &LoadOptions, progress: &dyn Progress) -> Resu
     let libraries = Libraries::read(folder, &libraries, &mut ledger);
     let (materials, textures) = materials::read(&material_names, &libraries, mesh.colors.is_some(), &mut ledger);
     if mesh.uvs.is_none() && materials.iter().any(|material| material.textures().next().is_some()) {
-        let warning = "images on a mesh without texture coordinates (vt): their lower left corner used";
-        ledger.note_in(Treatment::Warning, warning, Scope::Mesh(0));
+        let feature = "images on a mesh without texture coordinates (vt): their lower left corner used";
+        ledger.note_in(Treatment::Approximated, feature, Scope::Mesh(0));
     }
     let has_normal_map = |material: &Material| material.detail.as_ref().is_some_and(|detail| detail.normal.is_some());
     mesh.compute_tangents(|number| materials.get(number as usize).is_some_and(has_normal_map))
