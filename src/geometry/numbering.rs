@@ -33,9 +33,9 @@ struct Pair<K> {
 }
 
 impl<K: Copy + Eq + Hash> Numbering<K> {
-    /// No pairs, and so many owners: those with lower numbers than `owners` are found quickly.
+    /// No pairs, and so many owners: those with lower numbers than `owners` are found quickly. There is room for one pair each.
     pub fn new(owners: usize) -> Self {
-        Self { latest: vec![NONE; owners], pairs: Vec::new(), crowd: HashMap::new() }
+        Self { latest: vec![NONE; owners], pairs: Vec::with_capacity(owners), crowd: HashMap::new() }
     }
 
     /// Makes room for more owners.

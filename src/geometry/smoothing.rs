@@ -13,6 +13,9 @@ use crate::math::vector::{cross, dot, normalize};
 /// Stands for corners that have the normal of their face.
 const FLAT: u32 = u32::MAX;
 
+/// Stands for vertices that no corner has claimed. There are at most as many fans as corners, fewer than this.
+const UNCLAIMED: u32 = u32::MAX - 1;
+
 impl TriangleMesh {
     /// Gives vertices without a normal, or with one of zero, the mean of the faces of their group: of all triangles in the
     /// same group at the same place, weighted by their angle there as in [`compute_normals`](Self::compute_normals). A vertex
@@ -26,7 +29,7 @@ impl TriangleMesh {
         let places = places(&self.positions);
         let mut fans = Numbering::new(self.positions.len());
         let mut run = 0;
-        self.give_normals(|triangle, _, vertex| {
+        self.give_normals(self.positions.len(), |triangle, _, vertex| {
             if triangle == 0 {
                 run = 0;
             }
@@ -51,25 +54,29 @@ impl TriangleMesh {
             return Err(Error::limit(format!("mesh `{}` has too many triangles to be smoothed", self.name)));
         }
         let fans = fans(self, libm::cos(angle.clamp(0.0, std::f64::consts::PI)));
-        self.give_normals(|triangle, corner, _| fans[3 * triangle as usize + corner])
+        let count = fans.iter().max().map_or(0, |last| *last as usize + 1);
+        self.give_normals(count, |triangle, corner, _| fans[3 * triangle as usize + corner])
     }
 
     /// Gives vertices that lack a normal one for each fan of corners that they are part of. `fan` tells the fan of a corner by
-    /// its triangle, its position there and its vertex; it is asked twice for all corners, in the order of triangles.
-    fn give_normals(&mut self, mut fan: impl FnMut(u32, usize, u32) -> u32) -> Result<()> {
+    /// its triangle, its position there and its vertex; it is asked twice for all corners, in the order of triangles. There are
+    /// about `count` fans.
+    fn give_normals(&mut self, count: usize, mut fan: impl FnMut(u32, usize, u32) -> u32) -> Result<()> {
         let vertices = self.positions.len();
         let is_whole = |triangle: &[u32; 3]| triangle.iter().all(|&vertex| (vertex as usize) < vertices);
-        let mut sums: Vec<DVec3> = Vec::new();
+        // A vector that grows leaves holes behind, which count as memory in use.
+        let mut sums: Vec<DVec3> = Vec::with_capacity(count);
         for (number, triangle) in self.indices.iter().enumerate().filter(|(_, triangle)| is_whole(triangle)) {
             let p = triangle.map(|vertex| self.positions[vertex as usize].as_dvec3());
             let face = normalize(cross(p[1] - p[0], p[2] - p[0]));
+            let angles = angles(&p);
             for (corner, &vertex) in triangle.iter().enumerate() {
                 let fan = fan(number as u32, corner, vertex);
                 if fan != FLAT {
                     if fan as usize >= sums.len() {
                         sums.resize(fan as usize + 1, DVec3::ZERO);
                     }
-                    sums[fan as usize] += face.map_or(DVec3::ZERO, |face| face * angle_at(&p, corner));
+                    sums[fan as usize] += face.map_or(DVec3::ZERO, |face| face * angles[corner]);
                 }
             }
         }
@@ -78,7 +85,7 @@ impl TriangleMesh {
         let normal = |fan: u32| of_fans.get(fan as usize).copied().unwrap_or(Vec3::ZERO);
 
         // The fan that a vertex belongs to, and the copies that belong to others.
-        let mut own: Vec<Option<u32>> = vec![None; vertices];
+        let mut own = vec![UNCLAIMED; vertices];
         let mut copies: HashMap<(u32, u32), u32> = HashMap::new();
         self.normals.get_or_insert_with(|| vec![Vec3::ZERO; vertices]);
         for number in 0..self.indices.len() {
@@ -90,20 +97,18 @@ impl TriangleMesh {
                 let fan = fan(number as u32, corner, vertex);
                 let own = &mut own[vertex as usize];
                 let given = self.normals.as_ref().map_or(Vec3::ZERO, |normals| normals[vertex as usize]);
-                if *own == Some(fan) || (own.is_none() && given != Vec3::ZERO) {
+                if *own == fan || (*own == UNCLAIMED && given != Vec3::ZERO) {
                     continue;
                 }
-                let place = match (*own, copies.get(&(vertex, fan))) {
-                    (None, _) => {
-                        *own = Some(fan);
-                        vertex
-                    }
-                    (Some(_), Some(&copy)) => copy,
-                    (Some(_), None) => {
-                        let copy = self.copy_vertex(vertex)?;
-                        copies.insert((vertex, fan), copy);
-                        copy
-                    }
+                let place = if *own == UNCLAIMED {
+                    *own = fan;
+                    vertex
+                } else if let Some(&copy) = copies.get(&(vertex, fan)) {
+                    copy
+                } else {
+                    let copy = self.copy_vertex(vertex)?;
+                    copies.insert((vertex, fan), copy);
+                    copy
                 };
                 self.indices[number][corner] = place;
                 if let Some(normals) = &mut self.normals {
@@ -115,13 +120,13 @@ impl TriangleMesh {
     }
 }
 
-/// The angle of a triangle at one of its corners.
-fn angle_at(p: &[DVec3; 3], corner: usize) -> f64 {
-    let (to_next, to_last) = (p[(corner + 1) % 3] - p[corner], p[(corner + 2) % 3] - p[corner]);
-    match (normalize(to_next), normalize(to_last)) {
-        (Some(a), Some(b)) => libm::acos(dot(a, b).clamp(-1.0, 1.0)),
+/// The angles of a triangle; 0 where an edge has no length.
+fn angles(p: &[DVec3; 3]) -> [f64; 3] {
+    let edges: [Option<DVec3>; 3] = std::array::from_fn(|i| normalize(p[(i + 1) % 3] - p[i]));
+    std::array::from_fn(|i| match (edges[i], edges[(i + 2) % 3]) {
+        (Some(to_next), Some(from_last)) => libm::acos(dot(to_next, -from_last).clamp(-1.0, 1.0)),
         _ => 0.0,
-    }
+    })
 }
 
 /// For each vertex the first at the same place, bit for bit but for the sign of zeros.

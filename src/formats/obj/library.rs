@@ -24,6 +24,9 @@ pub(super) struct Libraries {
     pub incomplete: bool,
 }
 
+/// What became of the statements of a material, in words.
+pub(super) type Statements = Vec<(Treatment, String)>;
+
 /// A material as a library defines it.
 pub(super) struct Definition {
     /// What tobj made of its statements.
@@ -31,7 +34,7 @@ pub(super) struct Definition {
     /// The folder that its images are relative to.
     pub folder: PathBuf,
     /// What became of each statement.
-    pub statements: Vec<(Treatment, String)>,
+    pub statements: Statements,
 }
 
 impl Libraries {
@@ -105,10 +108,10 @@ fn split_names(names: &str) -> Vec<&str> {
 
 /// The statements that tobj shall read, each checked, in the spelling that it knows, and for each material what became of
 /// its statements.
-fn clean(path: &Path, reader: impl BufRead, ledger: &mut Ledger) -> Result<(String, Vec<Vec<(Treatment, String)>>)> {
+fn clean(path: &Path, reader: impl BufRead, ledger: &mut Ledger) -> Result<(String, Vec<Statements>)> {
     let mut lines = Lines::new(path, reader);
     let mut text = String::new();
-    let mut materials: Vec<Vec<(Treatment, String)>> = Vec::new();
+    let mut materials: Vec<Statements> = Vec::new();
     while let Some(statement) = lines.read()? {
         let cleaned = clean_statement(statement);
         let outcome = match cleaned {

@@ -118,8 +118,10 @@ impl<'a, R: BufRead> Lines<'a, R> {
 /// A `#` begins one anywhere among numbers, except in `1.#IND` and its like, which are old spellings of NaN. Among
 /// names it must follow white space and not precede a digit, since 3ds Max calls its materials `Material #25`.
 fn comment_start(line: &[u8]) -> Option<usize> {
-    let mut hashes = line.iter().enumerate().filter(|&(_, &byte)| byte == b'#').map(|(at, _)| at).peekable();
-    hashes.peek()?;
+    if !line.contains(&b'#') {
+        return None;
+    }
+    let mut hashes = line.iter().enumerate().filter(|&(_, &byte)| byte == b'#').map(|(at, _)| at);
     let named = ends_with_a_name(line.trim_ascii_start());
     hashes.find(|&at| {
         let before = at.checked_sub(1).map(|at| line[at]);

@@ -2,6 +2,7 @@
 
 use glam::DVec2;
 
+use super::texels::STEEPEST;
 use crate::scene::detail::Channel;
 
 /// The options and the file of a `map_` statement.
@@ -50,7 +51,7 @@ impl<'a> MapStatement<'a> {
                 }
                 "-bm" => {
                     let (found, after) = numbers(after, 1);
-                    map.bump = found.first().copied().unwrap_or(map.bump);
+                    map.bump = found.first().map_or(map.bump, |bump| bump.clamp(-STEEPEST, STEEPEST));
                     rest = after;
                 }
                 "-mm" => {

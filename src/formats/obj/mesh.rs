@@ -32,11 +32,14 @@ pub(super) fn build(
     progress: &dyn Progress,
     ledger: &mut Ledger,
 ) -> Result<(TriangleMesh, Vec<Option<String>>)> {
-    let origin = choose_origin(used_positions(&parsed));
+    let used = used_positions(&parsed);
+    let used_positions = || parsed.positions.iter().zip(&used).filter_map(|(&p, &used)| used.then_some(p));
+    let origin = choose_origin(used_positions());
     let rounding = Rounding {
-        largest_loss: rounding::largest_loss(used_positions(&parsed), origin),
-        finest_edge: rounding::finest_edge(edges(&parsed), rounding::magnitude(used_positions(&parsed))),
+        largest_loss: rounding::largest_loss(used_positions(), origin),
+        finest_edge: rounding::finest_edge(edges(&parsed), rounding::magnitude(used_positions())),
     };
+    drop(used);
     let (names, materials) = materials(&parsed);
     let groups = parsed.names.groups(parsed.faces.corner_counts());
     let smoothing = smoothing_runs(&parsed);
@@ -80,16 +83,16 @@ fn smooth(
     }
 }
 
-/// The positions that some corner refers to. Others, such as a stray point at zero beside a model in map coordinates, must
+/// Which positions some corner refers to. Others, such as a stray point at zero beside a model in map coordinates, must
 /// not decide where the origin is.
-fn used_positions(parsed: &Parsed) -> impl Iterator<Item = DVec3> + '_ {
+fn used_positions(parsed: &Parsed) -> Vec<bool> {
     let mut used = vec![false; parsed.positions.len()];
     for number in parsed.faces.positions() {
         if let Some(used) = used.get_mut(number as usize) {
             *used = true;
         }
     }
-    parsed.positions.iter().zip(used).filter_map(|(&p, used)| used.then_some(p))
+    used
 }
 
 /// The ends of every face's edges; NaN where a corner's vertex is not in the file.

@@ -91,8 +91,8 @@ pub fn read(reader: impl BufRead, path: &Path, options: &LoadOptions, progress: 
     let has_colors = mesh.colors.is_some();
     let (materials, textures) = materials::read(&material_names, &libraries, surroundings, has_colors, &mut ledger);
     if mesh.uvs.is_none() && materials.iter().any(|material| material.textures().next().is_some()) {
-        let warning = "images on a mesh without texture coordinates (vt): their lower left corner used";
-        ledger.note_in(Treatment::Warning, warning, Scope::Mesh(0));
+        let feature = "images on a mesh without texture coordinates (vt): their lower left corner used";
+        ledger.note_in(Treatment::Approximated, feature, Scope::Mesh(0));
     }
     let has_normal_map = |material: &Material| material.detail.as_ref().is_some_and(|detail| detail.normal.is_some());
     mesh.compute_tangents(|number| materials.get(number as usize).is_some_and(has_normal_map))

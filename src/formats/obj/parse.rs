@@ -179,24 +179,11 @@ impl Parsed {
     /// One corner: `v`, `v/vt`, `v//vn` or `v/vt/vn`.
     fn corner(&mut self, word: &str) -> Result<()> {
         let counts = [self.positions.len(), self.uvs.len(), self.normals.len()];
+        let indices = plain_indices(word).map_or_else(|| careful_indices(word), Ok)?;
         let mut corner = [ABSENT; 3];
-        let mut parts = word.split('/');
-        for (part, (number, count)) in corner.iter_mut().zip(counts).enumerate() {
-            *number = match parts.next() {
-                None | Some("") if part == 0 => return Err(malformed(word)),
-                None | Some("") => continue,
-                Some(index) => match index.parse::<i64>().map_err(|_| malformed(word))? {
-                    0 => {
-                        return Err(Error::file(format!("`{}` has the index 0", short(word)))
-                            .remedy("indices count from 1; negative ones count back from the last"));
-                    }
-                    index => resolve(index, count),
-                },
-            };
-            self.counts.attributes_outside += u64::from(part > 0 && *number == ABSENT);
-        }
-        if parts.next().is_some() {
-            return Err(malformed(word));
+        for part in (0..3).filter(|&part| indices[part] != 0) {
+            corner[part] = resolve(indices[part], counts[part]);
+            self.counts.attributes_outside += u64::from(part > 0 && corner[part] == ABSENT);
         }
         if self.without_normals {
             corner[2] = ABSENT;
@@ -308,6 +295,50 @@ fn resolve(index: i64, count: usize) -> u32 {
     u32::try_from(number).unwrap_or(ABSENT)
 }
 
+/// The indices of a corner, 0 for what is not there, where they are written as nearly all are: `None` for anything else.
+fn plain_indices(word: &str) -> Option<[i64; 3]> {
+    let (mut indices, mut part) = ([0i64; 3], 0);
+    let (mut digits, mut sign) = (0, 1);
+    for &byte in word.as_bytes() {
+        match byte {
+            b'0'..=b'9' if digits < 18 => {
+                indices[part] = 10 * indices[part] + i64::from(byte - b'0');
+                digits += 1;
+            }
+            b'-' if digits == 0 && sign == 1 => sign = -1,
+            b'/' if part < 2 && (digits > 0) == (indices[part] != 0) && (digits > 0 || sign == 1) => {
+                indices[part] *= sign;
+                (part, digits, sign) = (part + 1, 0, 1);
+            }
+            _ => return None,
+        }
+    }
+    let is_whole = (digits > 0) == (indices[part] != 0) && (digits > 0 || sign == 1);
+    indices[part] *= sign;
+    (is_whole && indices[0] != 0).then_some(indices)
+}
+
+/// The same for any spelling.
+///
+/// # Errors
+/// A file's error for what is no corner, and for an index of 0.
+fn careful_indices(word: &str) -> Result<[i64; 3]> {
+    let mut indices = [0; 3];
+    let mut parts = word.split('/');
+    for (number, index) in indices.iter_mut().enumerate() {
+        *index = match parts.next() {
+            None | Some("") if number == 0 => return Err(malformed(word)),
+            None | Some("") => continue,
+            Some(part) => part.parse().map_err(|_| malformed(word))?,
+        };
+        if *index == 0 {
+            return Err(Error::file(format!("`{}` has the index 0", short(word)))
+                .remedy("indices count from 1; negative ones count back from the last"));
+        }
+    }
+    if parts.next().is_some() { Err(malformed(word)) } else { Ok(indices) }
+}
+
 /// A corner that cannot be read.
 #[cold]
 fn malformed(word: &str) -> Error {
@@ -372,6 +403,22 @@ mod tests {
         assert_eq!(parsed.faces.corner_counts().collect::<Vec<_>>(), [3, 3, 4]);
         assert_eq!(parsed.faces.triangle_count(), 4);
         assert_eq!(parsed.uvs, [Vec2::new(1.0, 0.0)]);
+    }
+
+    #[test]
+    fn both_readers_of_corners_agree() {
+        let words =
+            ["1", "1/2", "1//3", "1/2/3", "-1/-22/-333", "1/", "1//", "123456789012345678/1", "/1", "1/2/3/4", "1/0"];
+        let odd =
+            ["0", "-0", "1/-", "-", "", "/", "--1", "1-2", "1.5", "x", "1/x", "1/2/-0", "1234567890123456789", "+1"];
+        for word in words.into_iter().chain(odd) {
+            if let Some(plain) = plain_indices(word) {
+                assert_eq!(careful_indices(word).unwrap(), plain, "{word}");
+            }
+        }
+        assert!(words[..8].iter().all(|word| plain_indices(word).is_some()));
+        assert!(odd.iter().all(|word| plain_indices(word).is_none()));
+        assert_eq!(careful_indices("+1/1234567890123456789").unwrap(), [1, 1_234_567_890_123_456_789, 0]);
     }
 
     #[test]

@@ -7,6 +7,9 @@ use crate::scene::Texture;
 use crate::scene::detail::Channel;
 use crate::scene::texture::{Texels, linear_to_srgb, srgb_to_linear};
 
+/// The steepest slope, and the largest factor of slopes: the normal then lies in the surface, as far as f32 can tell.
+pub(super) const STEEPEST: f64 = 1e6;
+
 /// Whether some texels are more opaque than others.
 pub(super) fn has_varying_alpha(image: &Texture) -> bool {
     match &image.texels {
@@ -53,7 +56,7 @@ pub(super) fn adjusted(image: Texture, [base, gain]: [f64; 2]) -> Texture {
         Texels::Srgb8(texels) => Texels::Srgb8(bytes(texels, srgb_to_linear, linear_to_srgb)),
         Texels::Data8(texels) => Texels::Data8(bytes(texels, same, same)),
         Texels::Linear32(texels) => {
-            let value = |value: f32| (base + gain * f64::from(value)) as f32;
+            let value = |value: f32| ((base + gain * f64::from(value)) as f32).clamp(f32::MIN, f32::MAX);
             Texels::Linear32(texels.iter().map(|texel| texel.map(value)).collect())
         }
     };
@@ -84,8 +87,9 @@ pub(super) fn normals_of_heights(image: &Texture, channel: Channel, scale: f64, 
     };
     let normal = |x: usize, y: usize| {
         let ((left, right), (above, below)) = (neighbours(x, width), neighbours(y, height));
-        let along_u = 0.5 * scale * (value(right, y) - value(left, y));
-        let along_v = 0.5 * scale * (value(x, above) - value(x, below));
+        let slope = |difference: f64| (0.5 * scale * difference).clamp(-STEEPEST, STEEPEST);
+        let along_u = slope(value(right, y) - value(left, y));
+        let along_v = slope(value(x, above) - value(x, below));
         let length = (along_u * along_u + along_v * along_v + 1.0).sqrt();
         [-along_u, -along_v, 1.0].map(|component| (0.5 + 0.5 * component / length) as f32)
     };
