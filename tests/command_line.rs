@@ -511,6 +511,7 @@ fn info_is_readable_and_its_json_is_stable() {
         "bytes_per_triangle.uvs",
         "bytes_per_triangle.materials",
         "ledger",
+        "doctor",
         "tree",
     ];
     assert_documented(&json, &expected);
@@ -527,6 +528,10 @@ fn info_is_readable_and_its_json_is_stable() {
         "tree.max_depth",
         "tree.bytes_per_triangle",
         "tree.validated",
+        "doctor.seconds",
+        "doctor.flaws",
+        "doctor.size",
+        "doctor.scaled_meshes",
     ]);
     assert_documented(&json, &expected);
 }
@@ -556,6 +561,32 @@ fn strict_fails_on_what_is_not_honoured_and_lists_it() {
     let verbose = text(&workshop.run("render model.obj --size 8x8 --spp 1 --verbose").stderr);
     let odd = verbose.lines().find(|line| line.contains("odd")).unwrap();
     assert!(odd.contains("1 material") && odd.contains(" pixel") && !odd.contains(" 0 pixels"), "{odd}");
+}
+
+#[test]
+fn flaws_of_meshes_are_told_with_their_places_and_are_no_failure() {
+    let workshop = Workshop::new();
+    let flaws = |name: &str| {
+        let json: Value = serde_json::from_slice(&workshop.succeed(&format!("info {name} --json --validate"))).unwrap();
+        json["doctor"]["flaws"].clone()
+    };
+    // A tetrahedron in map coordinates, one face turned round; and a quad before it, so that faces are not triangles.
+    let rest = "f 5 7 6\nf 5 6 8\nf 6 7 8\nf 5 7 8\n";
+    let vertices = "v 9e6 0 0\nv 9e6 0 1\nv 9e6 1 1\nv 9e6 1 0\nv 5e6 0 0\nv 5000001 0 0\nv 5e6 1 0\nv 5e6 0 1\n";
+    workshop.write("turned.obj", &format!("{vertices}f 1 2 3 4\n{rest}"));
+    let found = flaws("turned.obj");
+    assert_eq!(found.as_array().unwrap().len(), 2, "{found}");
+    assert_eq!((&found[0]["flaw"], &found[0]["count"]), (&"inconsistent_winding".into(), &3.into()));
+    assert_eq!((&found[1]["flaw"], &found[1]["count"]), (&"open_edge".into(), &4.into()), "around the quad");
+    let turned = &found[0]["places"][0];
+    assert_eq!((&turned["triangle"], &turned["face"]), (&2.into(), &1.into()));
+    assert_eq!(turned["mesh"], "turned");
+    assert_eq!(found[1]["places"][0]["position"][0], 9e6, "in the file's coordinates");
+    let told = text(&workshop.succeed("info turned.obj --validate"));
+    assert!(told.contains("open edges: 4\n    mesh `turned`, triangle 0, face 0, vertex "), "{told}");
+    assert!(told.contains("huge, 4.000e6 units across; likely in units of a millimetre"), "{told}");
+    workshop.write("closed.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n");
+    assert_eq!(flaws("closed.obj"), serde_json::json!([]));
 }
 
 #[test]

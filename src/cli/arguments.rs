@@ -220,7 +220,7 @@ pub struct InfoArguments {
     /// Also build the acceleration structures and tell their size.
     #[arg(long)]
     pub tree: bool,
-    /// Also build the acceleration structures and check them.
+    /// Also build the acceleration structures and check them, and tell what is wrong with the meshes.
     #[arg(long)]
     pub validate: bool,
     /// How the input is read.

@@ -7,6 +7,7 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::arguments::InfoArguments;
+use super::doctor::Diagnosis;
 use super::info_text;
 use super::ledger::{self, Told};
 use super::stats_json::{SCHEMA, lossy, lossy_list};
@@ -14,7 +15,7 @@ use super::terminal::{self, Terminal};
 use crate::error::{Error, Result};
 use crate::formats::ledger::Entry;
 use crate::formats::reach::{Census, Reach};
-use crate::formats::{self, Ledger, Loaded, Treatment};
+use crate::formats::{self, Ledger, LoadOptions, Loaded, Treatment};
 use crate::geometry::TriangleMesh;
 use crate::geometry::mesh::{DroppedCounts, Materials, Rounding};
 use crate::render::{BuildStats, Renderer};
@@ -55,6 +56,8 @@ pub struct Info<'a> {
     /// Geometry's bytes for each triangle in the meshes, dropped ones included; null without triangles.
     pub bytes_per_triangle: Option<PerTriangle>,
     pub ledger: Vec<LedgerEntry>,
+    /// What is wrong with the meshes; null unless `--validate` was given.
+    pub doctor: Option<Diagnosis>,
     /// Null unless `--tree` or `--validate` was given.
     pub tree: Option<Tree>,
 }
@@ -166,11 +169,16 @@ pub struct Tree {
 pub fn run(arguments: &InfoArguments) -> Result<()> {
     let terminal = Terminal::new(false)?;
     super::use_threads(arguments.build.threads)?;
-    let loaded = formats::open(&arguments.input, &arguments.load.options(), &terminal);
+    // Places are told by the faces of the file.
+    let options = LoadOptions { faces: arguments.validate, ..arguments.load.options() };
+    let loaded = formats::open(&arguments.input, &options, &terminal);
     terminal.clear();
     let Loaded { scene, ledger, .. } = loaded?;
     ledger::report(&arguments.input, &ledger, &scene, Told::Warnings, arguments.load.strict)?;
     let mut info = Info::of(&arguments.input, &scene, &ledger);
+    if arguments.validate {
+        info.doctor = Some(Diagnosis::of(&scene, info.bounds.as_ref()));
+    }
     if arguments.tree || arguments.validate {
         let renderer = arguments.build.params(&scene, 0).and_then(|params| Renderer::build(scene, &params, &terminal));
         terminal.clear();
@@ -230,6 +238,7 @@ impl<'a> Info<'a> {
             bytes,
             bytes_per_triangle: bytes.per_triangle(all_triangles),
             ledger: ledger.all().map(entry).collect(),
+            doctor: None,
             tree: None,
         }
     }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::doctor::Diagnosis;
 use super::info::{Info, PerTriangle, Tree};
 use super::ledger;
 use super::terminal::printable;
@@ -22,6 +23,9 @@ pub fn of(info: &Info<'_>) -> String {
     memory(&mut table, info);
     if let Some(tree) = &info.tree {
         tree_rows(&mut table, tree);
+    }
+    if let Some(doctor) = &info.doctor {
+        doctor_rows(&mut table, doctor);
     }
     if !info.ledger.is_empty() {
         table.heading("read");
@@ -132,6 +136,27 @@ fn tree_rows(table: &mut Table, tree: &Tree) {
     }
     if tree.validated {
         table.row("checked", "sound");
+    }
+}
+
+/// Flaws of the meshes, each with its first places.
+fn doctor_rows(table: &mut Table, doctor: &Diagnosis) {
+    table.heading("meshes");
+    table.row("examined in", format!("{:.3} s", doctor.seconds));
+    if let Some(size) = &doctor.size {
+        table.row("size", size);
+    }
+    if doctor.scaled_meshes > 0 {
+        table.row("beyond 2^-40 to 2^40", format!("{}, stored divided by a power of two", doctor.scaled_meshes));
+    }
+    for flaw in &doctor.flaws {
+        table.line(&format!("  {}: {}", flaw.flaw.words(), flaw.count));
+        for place in &flaw.places {
+            table.line(&format!("    {}", place.text()));
+        }
+    }
+    if doctor.flaws.is_empty() {
+        table.row("flaws", "none");
     }
 }
 

@@ -12,6 +12,7 @@ mod check_model;
 mod commit;
 mod completions;
 mod diff;
+mod doctor;
 mod info;
 mod info_text;
 mod ledger;

@@ -1,6 +1,7 @@
 //! Shapes and what a ray does with each: rays, boxes, triangles, meshes and quadrics.
 
 pub mod bounds;
+pub mod doctor;
 pub mod hit;
 pub mod mesh;
 pub mod numbering;
