@@ -165,10 +165,10 @@ fn save_partial(film: &Film, outputs: &Outputs, quiet: bool) -> Error {
 
 /// All that was noted while reading, with the pixels in which it is seen.
 fn report_ledger(ledger: &Ledger, scene: &Scene, film: &Film) {
-    let pixels = film.coverage.as_ref().map(|coverage| PixelCounts {
-        by_material: &coverage.materials,
-        by_mesh: &coverage.meshes,
-    });
+    let pixels = film
+        .coverage
+        .as_ref()
+        .map(|coverage| PixelCounts { by_material: &coverage.materials, by_mesh: &coverage.meshes });
     ledger::lines(ledger, scene, pixels, |_| true).iter().for_each(|line| terminal::report(line));
 }
 

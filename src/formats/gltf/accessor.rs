@@ -391,7 +391,7 @@ impl<'a> Accessor<'a> {
     }
 
     /// The same numbers, taken for fractions.
-    pub fn as_fractions(self) -> Self {
+    pub fn in_fractions(self) -> Self {
         Self { normalized: true, ..self }
     }
 

@@ -290,7 +290,7 @@ impl<'a> Part<'a, '_> {
         }
         if colors.has_integers() && !colors.is_normalized() {
             self.ledger.note(Treatment::Warning, "COLOR_0 of integers that are not normalised: taken for fractions", 1);
-            colors = colors.as_fractions();
+            colors = colors.in_fractions();
         }
         let beyond = Cell::new(false);
         let stored = |color: [f64; 4]| {

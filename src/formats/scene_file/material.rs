@@ -133,6 +133,10 @@ fn read_texture(value: &Value<'_>, reader: &mut Reader<'_>) -> Result<Option<Tex
     })?;
     let filters = [("linear", Filter::Linear), ("nearest", Filter::Nearest)];
     texture.filter = fields.or("filter", texture.filter, |value| value.choice(&filters))?;
+    if texture.filter == Filter::Nearest {
+        // Who wants single texels wants them at any distance.
+        texture.levels = [].into();
+    }
     let scale = fields.or("scale", DVec2::ONE, Value::pair)?;
     let offset = fields.or("offset", DVec2::ZERO, Value::pair)?;
     Ok(Some(TextureRef::scaled(reader.add_texture(texture), scale, offset)))
