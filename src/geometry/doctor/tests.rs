@@ -27,7 +27,10 @@ fn split_cube() -> TriangleMesh {
     }
 }
 
-fn found(mesh: TriangleMesh) -> Vec<(Flaw, u64, Vec<(Option<u32>, Option<u32>)>)> {
+/// Triangle and vertex.
+type Places = Vec<(Option<u32>, Option<u32>)>;
+
+fn found(mesh: TriangleMesh) -> Vec<(Flaw, u64, Places)> {
     let findings = examine(&mesh.finish().unwrap(), &|_, _| false);
     let places = |finding: &Finding| finding.places.iter().map(|place| (place.triangle, place.vertex)).collect();
     findings.iter().map(|(flaw, finding)| (flaw, finding.count, places(finding))).collect()
