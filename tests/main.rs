@@ -7,6 +7,7 @@ mod bench;
 mod command_line;
 mod common;
 mod diff;
+mod doctor;
 mod far_from_origin;
 mod golden;
 mod hard_cases;
