@@ -15,6 +15,6 @@ for target in "$@"; do
     mkdir -p "tests/fuzz/corpus/$target"
     cargo +nightly fuzz run --fuzz-dir tests/fuzz "$target" "tests/fuzz/corpus/$target" "tests/fuzz/seeds/$target" -- \
         -max_total_time="$seconds" -timeout=10 -rss_limit_mb=2048 -max_len=16384 -print_final_stats=1 \
-        -dict="tests/fuzz/dictionaries/$target.txt" -verbosity=0 || result=1
+        -dict="$PWD/tests/fuzz/dictionaries/$target.txt" -verbosity=0 || result=1
 done
 exit $result
