@@ -9,6 +9,7 @@ mod command_line;
 mod common;
 mod detail;
 mod diff;
+mod doctor;
 mod far_from_origin;
 mod golden;
 mod golden_models;

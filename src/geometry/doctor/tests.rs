@@ -27,10 +27,10 @@ fn split_cube() -> TriangleMesh {
     }
 }
 
-/// A flaw, how often it was found, and the first triangles and vertices.
-type Found = (Flaw, u64, Vec<(Option<u32>, Option<u32>)>);
+/// Triangle and vertex.
+type Places = Vec<(Option<u32>, Option<u32>)>;
 
-fn found(mesh: TriangleMesh) -> Vec<Found> {
+fn found(mesh: TriangleMesh) -> Vec<(Flaw, u64, Places)> {
     let findings = examine(&mesh.finish().unwrap(), &|_, _| false);
     let places = |finding: &Finding| finding.places.iter().map(|place| (place.triangle, place.vertex)).collect();
     findings.iter().map(|(flaw, finding)| (flaw, finding.count, places(finding))).collect()
