@@ -247,7 +247,7 @@ fn files_that_an_input_refers_to_are_never_overwritten() {
     );
     workshop.write("outer.toml", "[[object]]\nmesh = \"model.gltf\"\n");
     for input in ["model.obj", "model.gltf", "scene.toml", "outer.toml"] {
-        let refused = workshop.fail(&format!("render {input} --size 4x4 --spp 1 -o wood.png"));
+        let refused = workshop.fail(&format!("render {input} --size 4x4 --spp 1 -o wood.png --quiet"));
         assert!(refused.contains("wood.png"), "{refused}");
         assert_eq!(fs::read(workshop.path("wood.png")).unwrap(), wood, "{input}");
         workshop.succeed(&format!("render {input} --size 4x4 --spp 1 -o other.png --quiet"));
@@ -497,6 +497,10 @@ fn info_is_readable_and_its_json_is_stable() {
         "needs.transmissive_materials",
         "needs.lights",
         "needs.background_image",
+        "needs.colored_meshes",
+        "needs.detailed_materials",
+        "needs.materials_with_holes",
+        "needs.normal_mapped_materials",
         "bytes",
         "bytes.positions",
         "bytes.indices",
