@@ -68,34 +68,40 @@ impl<'a> Shown<'a> {
                     Err(error) => return Err(error),
                 }
             }
-            let variant = node.node.mesh.map(|mesh| Variant {
-                mesh: mesh.value(),
-                weights: shown.weights(node, mesh.value(), pose, ledger),
-                skin: skin.filter(|skin| shown.skins.contains_key(skin)),
-            });
-            shown.variants.push(variant);
+            let Some(mesh) = node.node.mesh.map(|mesh| mesh.value()) else {
+                shown.variants.push(None);
+                continue;
+            };
+            let weights = shown.weights(node, mesh, pose, budget, ledger)?;
+            let skin = skin.filter(|skin| shown.skins.contains_key(skin));
+            shown.variants.push(Some(Variant { mesh, weights, skin }));
         }
         Ok(shown)
     }
 
-    /// The bits of the weights of a node's mesh: those of an animation, else the node's, else the mesh's.
-    fn weights(&self, node: &PlacedNode, mesh: usize, pose: &Pose, ledger: &mut Ledger) -> Vec<u64> {
+    /// The bits of the weights of a node's mesh, up to the last that is not 0: those of an animation, else the node's,
+    /// else the mesh's.
+    fn weights(
+        &self,
+        node: &PlacedNode,
+        mesh: usize,
+        pose: &Pose,
+        budget: &mut Budget,
+        ledger: &mut Ledger,
+    ) -> Result<Vec<u64>> {
         let count = target_count(self.document, mesh);
-        let of_file = || {
-            let own = node.node.weights.as_ref().or(self.document.root.meshes[mesh].weights.as_ref());
-            own.into_iter().flatten().map(|&weight| f64::from(weight)).collect()
-        };
+        let own = node.node.weights.as_ref().or(self.document.root.meshes[mesh].weights.as_ref());
+        budget.take::<[u64; 2]>(own.map_or(0, Vec::len).max(pose.weights.get(&node.number).map_or(0, Vec::len)))?;
+        let of_file = || own.into_iter().flatten().map(|&weight| f64::from(weight)).collect();
         let mut weights: Vec<f64> = pose.weights.get(&node.number).cloned().unwrap_or_else(of_file);
         if weights.len() > count || weights.iter().any(|weight| !weight.is_finite()) {
             ledger.note(Treatment::Warning, "weights without a morph target, or not finite: left out", 1);
         }
         weights.truncate(count);
         weights.iter_mut().filter(|weight| !weight.is_finite()).for_each(|weight| *weight = 0.0);
-        if weights.iter().all(|&weight| weight == 0.0) {
-            Vec::new()
-        } else {
-            weights.into_iter().map(f64::to_bits).collect()
-        }
+        let used = weights.iter().rposition(|&weight| weight != 0.0).map_or(0, |last| last + 1);
+        weights.truncate(used);
+        Ok(weights.into_iter().map(f64::to_bits).collect())
     }
 
     /// Reads every mesh in every shape in which it is shown, and adds the objects of all nodes to the model.

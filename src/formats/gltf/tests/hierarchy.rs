@@ -4,6 +4,7 @@ use glam::DVec3;
 use serde_json::json;
 
 use super::*;
+use crate::error::Fault;
 use crate::formats::UpAxis;
 use crate::scene::{Camera, Falloff, LightKind, Projection, Rgb};
 
@@ -39,6 +40,27 @@ fn nodes_compose_scale_rotation_translation_and_matrices() {
     assert!(child.matrix3.determinant() < 0.0);
     assert!((child.translation.y - 0.2).abs() < 1e-12, "0.1 is read as f64, not as f32");
     assert_eq!(model.objects[1].name, "mirrored");
+}
+
+#[test]
+fn scenes_are_chosen_by_name_or_number() {
+    let mut file = File::default();
+    let position = file.triangle();
+    let rest = json!({
+        "meshes": [{"primitives": [{"attributes": {"POSITION": position}}]}],
+        "nodes": [{"mesh": 0, "name": "a"}, {"mesh": 0, "name": "b"}],
+        "scenes": [{"nodes": [0], "name": "hall"}, {"nodes": [1]}], "scene": 1,
+    });
+    let load = |scene: Option<&str>| {
+        load_json(&file.json(rest.clone()), &LoadOptions { scene: scene.map(str::to_owned), ..Default::default() })
+    };
+    for (scene, shown) in [(None, "b"), (Some("hall"), "a"), (Some("0"), "a"), (Some("1"), "b")] {
+        let model = load(scene).unwrap();
+        assert_eq!(model.objects[0].name, shown, "{scene:?}");
+        assert_eq!(has_note(&model, Treatment::Ignored, "other scene (see --scene)"), scene.is_none());
+    }
+    let error = load(Some("attic")).unwrap_err();
+    assert!(error.fault() == Fault::Caller && error.to_string().contains("0 `hall`, 1"), "{error}");
 }
 
 #[test]

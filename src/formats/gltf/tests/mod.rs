@@ -1,9 +1,12 @@
 //! Whole files: small ones written here, one a feature, and the models of `shared/data` where they are present.
 
+mod attributes;
 mod geometry;
 mod hierarchy;
 mod materials;
 mod models;
+mod motion;
+mod posed_models;
 mod robustness;
 
 use std::path::Path;
