@@ -136,14 +136,109 @@ fn write_hills(path: &Path, side: u32, kind: &str) {
     }
 }
 
+/// Writes such hills as a `.glb` file: positions and 32-bit indices, with normals and texture coordinates too, or these with
+/// 16-bit positions beside each other.
+fn write_binary_hills(path: &Path, side: u32, kind: &str) {
+    let at = |i: u32| i as f32 / side as f32;
+    let vertices = || (0..=side).flat_map(|j| (0..=side).map(move |i| (i, j)));
+    let height = |i: u32, j: u32| 0.1 * libm::sinf(9.0 * at(i)) * libm::sinf(7.0 * at(j));
+    let position = |(i, j): (u32, u32)| [at(i), 0.2 + height(i, j), at(j)];
+    let count = u64::from(side + 1).pow(2);
+    // For each attribute its name, type, component, offset within a vertex or before all of them, and stride.
+    let (attributes, stride): (&[(&str, &str, u32, u64)], u64) = match kind {
+        "plain" => (&[("POSITION", "VEC3", 5126, 0)], 12),
+        "full" => (
+            &[
+                ("POSITION", "VEC3", 5126, 0),
+                ("NORMAL", "VEC3", 5126, 12 * count),
+                ("TEXCOORD_0", "VEC2", 5126, 24 * count),
+            ],
+            32,
+        ),
+        _ => (&[("POSITION", "VEC3", 5123, 0), ("NORMAL", "VEC3", 5126, 8), ("TEXCOORD_0", "VEC2", 5126, 20)], 28),
+    };
+    let (vertex_bytes, index_bytes) = (stride * count, 24 * u64::from(side).pow(2));
+    let views: Vec<String> = attributes
+        .iter()
+        .map(|&(_, _, _, offset)| match kind {
+            "interleaved" => format!(r#"{{"buffer":0,"byteLength":{vertex_bytes},"byteStride":{stride}}}"#),
+            _ => format!(r#"{{"buffer":0,"byteOffset":{offset},"byteLength":{}}}"#, vertex_bytes - offset),
+        })
+        .collect();
+    let accessors: Vec<String> = attributes
+        .iter()
+        .enumerate()
+        .map(|(view, (_, shape, component, offset))| {
+            let offset = if kind == "interleaved" { *offset } else { 0 };
+            format!(
+                r#"{{"bufferView":{view},"byteOffset":{offset},"componentType":{component},"type":"{shape}","count":{count},
+                "normalized":{},"min":[0,0,0],"max":[1,1,1]}}"#,
+                *component != 5126
+            )
+        })
+        .collect();
+    let names: Vec<String> =
+        attributes.iter().enumerate().map(|(number, (name, ..))| format!(r#""{name}":{number}"#)).collect();
+    let mut json = format!(
+        r#"{{"asset":{{"version":"2.0"}},"extensionsUsed":["KHR_mesh_quantization"],"nodes":[{{"mesh":0}}],
+        "meshes":[{{"primitives":[{{"attributes":{{{}}},"indices":{}}}]}}],"buffers":[{{"byteLength":{}}}],
+        "bufferViews":[{},{{"buffer":0,"byteOffset":{vertex_bytes},"byteLength":{index_bytes}}}],
+        "accessors":[{},{{"bufferView":{},"componentType":5125,"type":"SCALAR","count":{}}}]}}"#,
+        names.join(","),
+        attributes.len(),
+        vertex_bytes + index_bytes,
+        views.join(","),
+        accessors.join(","),
+        attributes.len(),
+        index_bytes / 4
+    );
+    json.extend(std::iter::repeat_n(' ', json.len().next_multiple_of(4) - json.len()));
+    let mut file = BufWriter::new(std::fs::File::create(path).unwrap());
+    let word = |n: u64| u32::try_from(n).unwrap().to_le_bytes();
+    let json_bytes = json.len() as u64;
+    file.write_all(b"glTF\x02\0\0\0").unwrap();
+    file.write_all(&word(28 + json_bytes + vertex_bytes + index_bytes)).unwrap();
+    file.write_all(&word(json_bytes)).unwrap();
+    file.write_all(b"JSON").unwrap();
+    file.write_all(json.as_bytes()).unwrap();
+    file.write_all(&word(vertex_bytes + index_bytes)).unwrap();
+    file.write_all(b"BIN\0").unwrap();
+    let mut floats = |values: &[f32]| values.iter().for_each(|x| file.write_all(&x.to_le_bytes()).unwrap());
+    match kind {
+        "plain" => vertices().for_each(|vertex| floats(&position(vertex))),
+        "full" => {
+            vertices().for_each(|vertex| floats(&position(vertex)));
+            vertices().for_each(|(i, _)| floats(&[0.1 * at(i), 1.0, 0.0]));
+            vertices().for_each(|(i, j)| floats(&[at(i), at(j)]));
+        }
+        _ => {
+            for (i, j) in vertices() {
+                let [x, y, z] = position((i, j)).map(|x| (65535.0 * x) as u16);
+                [x, y, z, 0].iter().for_each(|x| file.write_all(&x.to_le_bytes()).unwrap());
+                [0.1 * at(i), 1.0, 0.0, at(i), at(j)].iter().for_each(|x| file.write_all(&x.to_le_bytes()).unwrap());
+            }
+        }
+    }
+    for (j, i) in (0..side).flat_map(|j| (0..side).map(move |i| (j, i))) {
+        let corner = |i: u32, j: u32| j * (side + 1) + i;
+        let [a, b, c, d] = [corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)];
+        [a, c, b, a, d, c].iter().for_each(|x| file.write_all(&x.to_le_bytes()).unwrap());
+    }
+}
+
 /// Loads in this process, in which nothing else runs, and prints what it took.
 #[test]
-#[ignore = "asked for by the test below, in a process of its own"]
+#[ignore = "asked for by the tests below, in a process of its own"]
 fn load_alone() {
     let path = std::env::var(FILE).unwrap();
     // What is loaded once, such as the code itself, is no part of what a model takes.
-    let small = Path::new(&path).with_file_name("small.obj");
-    write_hills(&small, 4, "full");
+    let is_binary = path.ends_with(".glb");
+    let small = Path::new(&path).with_file_name(if is_binary { "small.glb" } else { "small.obj" });
+    if is_binary {
+        write_binary_hills(&small, 4, "full")
+    } else {
+        write_hills(&small, 4, "full")
+    }
     drop(load_model(&small, &LoadOptions::default(), &Silent).unwrap());
     let measured = std::fs::write("/proc/self/clear_refs", "5").ok().and_then(|()| status("VmRSS"));
     let model = load_model(Path::new(&path), &LoadOptions::default(), &Silent).unwrap();
@@ -157,10 +252,14 @@ fn load_alone() {
 const FILE: &str = "WHITTED_TEST_FILE";
 
 /// The peak of loading is at most twice what there is in the end, and 4 MiB for buffers and a stack of threads.
-fn check_load(side: u32, kind: &str) {
+fn check_load(side: u32, suffix: &str, kind: &str) {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("hills.obj");
-    write_hills(&path, side, kind);
+    let path = folder.path().join(format!("hills.{suffix}"));
+    if suffix == "glb" {
+        write_binary_hills(&path, side, kind)
+    } else {
+        write_hills(&path, side, kind)
+    }
     let output = std::process::Command::new(std::env::current_exe().unwrap())
         .args(["memory::load_alone", "--exact", "--ignored", "--nocapture"])
         .env(FILE, &path)
@@ -176,16 +275,28 @@ fn check_load(side: u32, kind: &str) {
     };
     let triangles = f64::from(2 * side * side);
     println!(
-        "{kind}, {triangles} triangles: {:.1} bytes each in the end, {:.1} at the peak",
+        "{suffix}, {kind}, {triangles} triangles: {:.1} bytes each in the end, {:.1} at the peak",
         end / triangles,
         peak / triangles
     );
-    assert!(peak < 2.0 * end + f64::from(4 << 20), "{kind}: {peak} bytes at the peak, {end} in the end");
+    assert!(peak < 2.0 * end + f64::from(4 << 20), "{suffix}, {kind}: {peak} bytes at the peak, {end} in the end");
 }
 
 #[test]
 fn loading_an_obj_file_takes_at_most_twice_what_it_makes() {
-    let all = |side: u32| ["plain", "quads", "smooth", "full"].into_iter().for_each(|kind| check_load(side, kind));
+    let all =
+        |side: u32| ["plain", "quads", "smooth", "full"].into_iter().for_each(|kind| check_load(side, "obj", kind));
+    all(724);
+    if std::env::var_os("WHITTED_FULL_TESTS").is_some() {
+        all(2237);
+    } else {
+        eprintln!("skipped: 10 million triangles; set WHITTED_FULL_TESTS for them");
+    }
+}
+
+#[test]
+fn loading_a_glb_file_takes_at_most_twice_what_it_makes() {
+    let all = |side: u32| ["plain", "full", "interleaved"].into_iter().for_each(|kind| check_load(side, "glb", kind));
     all(724);
     if std::env::var_os("WHITTED_FULL_TESTS").is_some() {
         all(2237);
