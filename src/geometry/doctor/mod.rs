@@ -42,7 +42,7 @@ pub enum Flaw {
     OpposedNormal,
     /// A vertex whose shading normal is zero: the face's is used.
     ZeroNormal,
-    /// A vertex whose shading normal is not finite, or not of length 1 to within [`LENGTH_TOLERANCE`](corners::LENGTH_TOLERANCE).
+    /// A vertex whose shading normal is not finite, or whose length differs from 1 by more than 0.01.
     NonUnitNormal,
     /// A triangle with texture coordinates outside an image that does not repeat.
     OutsideImage,
