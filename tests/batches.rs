@@ -35,6 +35,14 @@ fn batches_see_details_as_the_recursion_does() {
     }
 }
 
+/// So many objects that they share blocks, of one material, every other one with colours at its vertices.
+#[test]
+fn batches_tell_coloured_meshes_from_others_of_the_same_material() {
+    let mut scene = crate::detail::coloured_and_plain_squares(100);
+    scene.film.clamp = Clamp::Output;
+    check(scene, "squares");
+}
+
 /// Renders a small picture in both ways.
 fn check(mut scene: Scene, name: &str) {
     // Neither size is a multiple of the side of a block of pixels.

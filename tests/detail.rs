@@ -89,6 +89,26 @@ pub fn everything() -> Scene {
     scene
 }
 
+/// Small squares side by side, a row of them after the other, of one material; every other one has red vertices.
+pub fn coloured_and_plain_squares(count: u32) -> Scene {
+    let mut scene = empty_scene();
+    let side = f64::from(count).sqrt().ceil() as u32;
+    for number in 0..count {
+        let colors = number.is_multiple_of(2).then(|| vec![[65535, 0, 0, 65535]; 4]);
+        let (x, y) = (f64::from(number % side), f64::from(number / side));
+        let place =
+            DAffine3::from_translation(DVec3::new(x, y, 0.0) * (2.0 / f64::from(side)) - DVec3::new(0.9, 0.9, 0.0));
+        let size = DAffine3::from_scale(DVec3::splat(0.9 / f64::from(side)));
+        add_mesh(&mut scene, TriangleMesh { colors, ..square(0.0) }, place * size, white());
+    }
+    scene.objects.iter_mut().for_each(|object| object.material = Some(1));
+    add_light(&mut scene, DVec3::new(1.0, 2.0, 9.0), Rgb::ONE);
+    let projection = Projection::Perspective { fov_y: 0.5 };
+    let (eye, target, up) = (DVec3::new(0.0, 0.0, 4.5), DVec3::ZERO, DVec3::Y);
+    scene.cameras = vec![NamedCamera { name: "all".into(), camera: Camera::LookAt { eye, target, up, projection } }];
+    scene
+}
+
 #[test]
 fn masked_surfaces_are_there_or_not_for_eyes_and_lights() {
     let mut scene = empty_scene();

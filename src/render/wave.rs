@@ -198,11 +198,11 @@ impl<I: Answers> Tracer<'_, I> {
         let mut last = None;
         for at in 0..block.found.count {
             let number = block.points.materials[at];
+            let detailed = self.is_detailed(&self.scene.materials[number as usize], &block.found.hits[at]);
             let colors = match last {
-                Some((same, colors)) if same == number => colors,
+                Some((same, colors)) if same == number && !detailed => colors,
                 _ => {
                     let material = &self.scene.materials[number as usize];
-                    let detailed = self.is_detailed(material, &block.found.hits[at]);
                     let point = || (block.points.get(at), block.found.hits[at]);
                     let terms = if detailed {
                         self.terms(&block.points.get(at), &block.found.hits[at])

@@ -175,6 +175,21 @@ impl Material {
 }
 
 impl Rule {
+    /// Whether light may go through at some points, even where it does not at the mean of all images.
+    pub fn transmits(&self) -> bool {
+        matches!(self, Self::MetallicRoughness(model) if model.transmission > 0.0)
+    }
+
+    /// The surface for images that are white throughout; `None` for rules that are no microfacet model.
+    pub fn plain_surface(&self) -> Option<Surface> {
+        let white = |_: &TextureRef| Vec4::ONE;
+        match self {
+            Self::MetallicRoughness(model) => Some(model.surface(Rgb::ONE, white)),
+            Self::SpecularGlossiness(model) => Some(model.surface(Rgb::ONE, white)),
+            Self::Phong { .. } | Self::Unlit { .. } => None,
+        }
+    }
+
     fn textures(&self) -> [Option<&TextureRef>; 4] {
         match self {
             Self::Phong { highlight } => [highlight.as_ref(), None, None, None],

@@ -112,7 +112,8 @@ impl Material {
 
     /// Whether light may pass somewhere: then shadow rays are attenuated, not blocked.
     pub fn lets_light_through(&self) -> bool {
-        self.is_transmissive() || self.has_holes()
+        let transmits = |detail: &Detail| detail.rule.transmits();
+        self.is_transmissive() || self.has_holes() || self.detail.as_deref().is_some_and(transmits)
     }
 
     /// Whether the surface may not be there at some points.

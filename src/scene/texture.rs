@@ -185,12 +185,22 @@ impl Texture {
     /// The image with smaller versions of it: a third more memory.
     ///
     /// Texels are means of those that they cover, in linear light and weighted by alpha, so that what is not seen has no part.
-    pub fn with_levels(mut self) -> Self {
+    pub fn with_levels(self) -> Self {
+        let has_colors = !matches!(self.texels, Texels::Data8(_));
+        self.with_halves(has_colors)
+    }
+
+    /// The same without weights: for images whose alpha does not tell how much of a texel there is.
+    pub fn with_plain_levels(self) -> Self {
+        self.with_halves(false)
+    }
+
+    fn with_halves(mut self, by_alpha: bool) -> Self {
         let mut levels: Vec<Level> = Vec::new();
         let (mut width, mut height) = (self.width, self.height);
         while width > 1 || height > 1 {
             let texels = levels.last().map_or(&self.texels, |level| &level.texels);
-            let texels = halved(texels, width, height);
+            let texels = halved(texels, width, height, by_alpha);
             (width, height) = (half(width), half(height));
             levels.push(Level { width, height, texels });
         }
@@ -210,10 +220,8 @@ fn half(side: u32) -> u32 {
 }
 
 /// An image of half the width and height. Of an odd number of texels three make one, the outer two by what they share in it.
-fn halved(texels: &Texels, width: u32, height: u32) -> Texels {
+fn halved(texels: &Texels, width: u32, height: u32, by_alpha: bool) -> Texels {
     let (to_width, to_height) = (half(width), half(height));
-    // Alpha of numbers is one of them.
-    let has_colors = !matches!(texels, Texels::Data8(_));
     let row = |y: u32| {
         let (rows, row_weights) = covered(y, height);
         (0..to_width).map(move |x| {
@@ -227,7 +235,7 @@ fn halved(texels: &Texels, width: u32, height: u32) -> Texels {
                     plain += texel * weight;
                 }
             }
-            let color = if has_colors && sum.w > 0.0 { sum.truncate() / sum.w } else { plain.truncate() };
+            let color = if by_alpha && sum.w > 0.0 { sum.truncate() / sum.w } else { plain.truncate() };
             color.extend(plain.w)
         })
     };
@@ -369,6 +377,10 @@ mod tests {
         let texels = Texels::Srgb8(vec![[255, 0, 0, 255], [0, 255, 0, 0], [255, 0, 0, 255], [0, 0, 255, 0]].into());
         let t = Texture::new("leaf", 2, 2, texels).with_levels();
         assert_eq!(t.levels[0].texels.get(0), Vec4::new(1.0, 0.0, 0.0, FRACTION[128]));
+        // Unless alpha is something else.
+        let plain = Texture { levels: [].into(), ..t }.with_plain_levels();
+        let texel = plain.levels[0].texels.get(0);
+        assert!((texel - Vec4::new(0.5, 0.25, 0.25, 0.5)).abs().max_element() < 0.005, "{texel}");
     }
 
     #[test]

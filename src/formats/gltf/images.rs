@@ -36,8 +36,10 @@ pub(super) struct Textures<'a> {
 /// What an image's bytes are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) enum Encoding {
-    /// Colours in sRGB.
+    /// Colours in sRGB, whose alpha is none or something of its own.
     Srgb,
+    /// Colours in sRGB, whose alpha tells how much of them there is.
+    SrgbWithAlpha,
     /// Numbers.
     Numbers,
 }
@@ -179,7 +181,11 @@ fn sampled(root: &Root, texture: usize, image: &Texture, encoding: Encoding) -> 
         (texels, _) => texels.clone(),
     };
     let texture = Texture { wrap, filter, texels, ..image.clone() };
-    if has_levels { texture.with_levels() } else { texture }
+    match encoding {
+        _ if !has_levels => texture,
+        Encoding::SrgbWithAlpha => texture.with_levels(),
+        Encoding::Srgb | Encoding::Numbers => texture.with_plain_levels(),
+    }
 }
 
 /// KHR_texture_transform, which is for coordinates whose v goes down, for those whose v goes up: with `F (u, v) = (u, 1 - v)`

@@ -36,6 +36,8 @@ impl MaterialReader<'_, '_> {
         let name = source.name.clone().unwrap_or_else(|| format!("material {number}"));
         let single_sided = self.cull_back_faces && !source.double_sided;
         let mut reading = Reading { reader: self, source, number };
+        // Light must find its way out of a solid.
+        let single_sided = single_sided && !reading.is_solid();
         reading.note_what_is_plain();
         let material = if is_unlit(source) { reading.unlit() } else { reading.shaded() };
         let colors = [material.emission, material.diffuse, material.specular, material.ks, material.kr, material.kt];
@@ -67,12 +69,13 @@ pub(super) fn textures_of(source: &Source) -> impl Iterator<Item = Index<Texture
     infos.into_iter().flatten().map(|info| info.index).chain(source.normal_texture.iter().map(|normal| normal.index))
 }
 
-/// The materials of primitives whose vertices have colours, by number.
+/// The materials of primitives whose vertices have colours, by number; that of those without one follows the last.
 pub(super) fn colored(root: &Root) -> HashSet<usize> {
     let has_colors = |key: &Checked<Semantic>| matches!(key, Checked::Valid(Semantic::Colors(0)));
     let primitives = root.meshes.iter().flat_map(|mesh| &mesh.primitives);
     let colored = primitives.filter(|primitive| primitive.attributes.keys().any(has_colors));
-    colored.filter_map(|primitive| primitive.material).map(|material| material.value()).collect()
+    let default = root.materials.len();
+    colored.map(|primitive| primitive.material.map_or(default, |material| material.value())).collect()
 }
 
 fn specular_glossiness(source: &Source) -> Option<&::gltf::json::extensions::material::PbrSpecularGlossiness> {
@@ -134,7 +137,7 @@ impl Reading<'_, '_, '_> {
     /// KHR_materials_unlit: the base colour as it is, whatever the lights.
     fn unlit(&mut self) -> Material {
         let color = base_factor(self.source).0;
-        let diffuse_texture = self.refer(base_texture(self.source), Encoding::Srgb, "baseColorTexture");
+        let diffuse_texture = self.refer(base_texture(self.source), self.base_encoding(), "baseColorTexture");
         let varies = diffuse_texture.is_some() || self.reader.colored.contains(&self.number);
         let rule = if varies { Rule::Unlit { color } } else { Rule::Phong { highlight: None } };
         let material = Material {
@@ -184,7 +187,7 @@ impl Reading<'_, '_, '_> {
                 "transmissionTexture",
             ),
         };
-        let diffuse_texture = self.refer(base_texture(source), Encoding::Srgb, "baseColorTexture");
+        let diffuse_texture = self.refer(base_texture(source), self.base_encoding(), "baseColorTexture");
         // What is neither metal nor lets light through has its base colour in the diffuse term alone.
         let base_varies = diffuse_texture.is_some() || self.reader.colored.contains(&self.number);
         let is_simple = model.metallic == 0.0 && model.transmission == 0.0;
@@ -226,7 +229,7 @@ impl Reading<'_, '_, '_> {
             glossiness: specular.glossiness_factor.0,
             map,
         };
-        let diffuse_texture = self.refer(base_texture(source), Encoding::Srgb, "diffuseTexture");
+        let diffuse_texture = self.refer(base_texture(source), self.base_encoding(), "diffuseTexture");
         let mean = self.mean(diffuse_texture.as_ref());
         let (material, rule) = self.by_rule(Rule::SpecularGlossiness(model), mean, map.is_some());
         (Material { diffuse_texture, ..material }, Detail { rule, ..Detail::NONE })
@@ -245,6 +248,14 @@ impl Reading<'_, '_, '_> {
             (Material::default().with_phong_of(&surface(mean.truncate())), rule)
         } else {
             (Material::default().with_phong_of(&surface(Rgb::ONE)), Rule::Phong { highlight: None })
+        }
+    }
+
+    /// Of a base texture: its alpha matters where the surface is masked or blended, and nowhere else.
+    fn base_encoding(&self) -> Encoding {
+        match self.source.alpha_mode {
+            Checked::Valid(SourceAlpha::Blend | SourceAlpha::Mask) => Encoding::SrgbWithAlpha,
+            _ => Encoding::Srgb,
         }
     }
 

@@ -49,14 +49,18 @@ pub fn read_override(fields: &Fields<'_>, imported: &Material, reader: &mut Read
     let own: Vec<&str> = FIELDS.iter().copied().filter(|&key| key != "name").chain(["material"]).collect();
     fields.accept(&own)?;
     let mut material = imported.clone();
-    if let Some(detail) = &mut material.detail {
-        // What is set by hand is not computed from images.
-        if TERMS.iter().any(|key| fields.has(key)) {
+    if let Some(mut detail) = material.detail.take() {
+        // What is set by hand is not computed from images; the rest is what the model says without them.
+        if let Some(surface) = detail.rule.plain_surface()
+            && TERMS.iter().any(|key| fields.has(key))
+        {
             detail.rule = Rule::Phong { highlight: None };
+            material = material.with_phong_of(&surface);
         }
         if fields.has("kt") || fields.has("opacity") {
             detail.alpha = None;
         }
+        material.detail = Some(detail);
     }
     change(&mut material, fields, reader)?;
     Ok(material)
