@@ -171,9 +171,9 @@ pub struct LoadArguments {
     /// The time in seconds at which a glTF file's animation is shown; without it nothing is animated.
     #[arg(long, value_name = "SECONDS", value_parser = values::seconds, allow_hyphen_values = true)]
     pub time: Option<f64>,
-    /// Which animation of a glTF file, by name or number from 0.
-    #[arg(long, value_name = "ANIMATION", requires = "time", default_value = "0")]
-    pub animation: String,
+    /// Which animation of a glTF file, by name or number from 0; without it the first.
+    #[arg(long, value_name = "ANIMATION", requires = "time")]
+    pub animation: Option<String>,
     /// Do not show the back of what a glTF file calls single-sided.
     #[arg(long)]
     pub cull_back_faces: bool,
@@ -285,7 +285,7 @@ impl LoadArguments {
             faces: false,
             crease_angle: self.crease_angle,
             scene: self.scene.clone(),
-            animation: self.time.map(|_| self.animation.clone()),
+            animation: self.animation.clone(),
             time: self.time,
             cull_back_faces: self.cull_back_faces,
             allow_external: self.allow_external,

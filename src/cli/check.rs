@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueHint};
 
+use super::arguments::LoadArguments;
 use super::stats_json::timed;
 use super::terminal::{self, Terminal};
 use super::{arguments, values};
@@ -46,6 +47,9 @@ pub struct CheckArguments {
     /// Draw other rays: any number.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
+    /// How a model is read.
+    #[command(flatten)]
+    pub load: LoadArguments,
 }
 
 /// What a case found, and how long that took.

@@ -13,7 +13,7 @@ use super::stats_json::SCHEMA;
 use super::terminal::{self, Terminal};
 use crate::accel::{Kind, Params, Preset};
 use crate::error::{Error, Result};
-use crate::formats::{self, LoadOptions};
+use crate::formats;
 use crate::geometry::Hit;
 use crate::measure::agreement::{self, Agreement, Class, Example};
 use crate::measure::hexadecimal::hexadecimal;
@@ -27,10 +27,10 @@ use crate::measure::rays::RayFamily;
 /// # Errors
 /// A scene that cannot be opened or built; answers that no bound explains, once all are printed; an interrupt.
 pub fn run(path: &Path, kinds: &[Kind], arguments: &CheckArguments, terminal: &Terminal) -> Result<()> {
-    let loaded = formats::open(path, &LoadOptions::default(), terminal);
+    let loaded = formats::open(path, &arguments.load.options(), terminal);
     terminal.clear();
     let loaded = loaded?;
-    ledger::report(path, &loaded.ledger, &loaded.scene, Told::Warnings, false)?;
+    ledger::report(path, &loaded.ledger, &loaded.scene, Told::Warnings, arguments.load.strict)?;
     let scene = loaded.scene;
     let structures: Vec<Params> = kinds.iter().flat_map(|&kind| presets(kind)).collect();
     let found = agreement::check(&scene, &structures, &RayFamily::ALL, arguments.rays, arguments.seed, terminal);

@@ -60,8 +60,8 @@ impl Diagnosis {
     pub fn of(scene: &Scene, bounds: Option<&BoundsInfo>) -> Self {
         let start = Instant::now();
         let mut flaws: BTreeMap<Flaw, FlawInfo> = BTreeMap::new();
+        let clamped = clamped_textures(scene);
         for mesh in &scene.meshes {
-            let clamped = clamped_textures(scene);
             let outside = |material: u32, vertex: u32| is_outside(mesh, &clamped[material as usize], vertex);
             for (flaw, finding) in doctor::examine(mesh, &outside).iter() {
                 let info = flaws.entry(flaw).or_insert_with(|| FlawInfo { flaw, count: 0, places: Vec::new() });

@@ -16,8 +16,6 @@ pub enum Told {
     Nothing,
     /// Warnings.
     Warnings,
-    /// All of it, with what it concerns.
-    Everything,
 }
 
 /// Reports what was noted while `input` was read, on standard error. With `strict` what is not honoured is reported in any
@@ -29,11 +27,10 @@ pub fn report(input: &Path, ledger: &Ledger, scene: &Scene, told: Told, strict: 
     let shortcomings = ledger.entries().filter(|(treatment, ..)| *treatment != Treatment::Honoured).count();
     let refused = strict && shortcomings > 0;
     let wanted = |treatment| match told {
-        Told::Everything => true,
         Told::Warnings if treatment == Treatment::Warning => true,
         _ => refused && treatment != Treatment::Honoured,
     };
-    if told == Told::Everything || refused {
+    if refused {
         lines(ledger, scene, None, wanted).iter().for_each(|line| terminal::report(line));
     } else {
         let lines = ledger.entries().filter(|(treatment, ..)| wanted(*treatment));

@@ -43,7 +43,8 @@ pub fn run(arguments: &RenderArguments) -> Result<()> {
     (loaded, seconds.load) = timed(|| formats::open(&arguments.input, &options, &terminal));
     terminal.clear();
     let formats::Loaded { mut scene, ledger, automatic } = loaded?;
-    let told = if arguments.quiet { Told::Nothing } else { Told::Warnings };
+    // With --verbose they come with all else, once it is known in how many pixels they are seen.
+    let told = if arguments.quiet || arguments.verbose { Told::Nothing } else { Told::Warnings };
     ledger::report(&arguments.input, &ledger, &scene, told, arguments.load.strict)?;
     outputs.refuse_inputs(ledger.files())?;
     report_time("load", seconds.load);

@@ -124,10 +124,8 @@ pub fn open(path: &Path, options: &LoadOptions, progress: &dyn Progress) -> Resu
     }
     let model = load_model(path, options, progress)?;
     let mut scene = Scene::default();
-    let mut ledger = model.ledger.clone();
-    ledger.shift(scene.materials.len() as u32, scene.meshes.len() as u32);
     let physical_lights = model.physical_lights;
-    model.append_to(&mut scene);
+    let ledger = model.append_to(&mut scene);
     scene.origin = origin::choose(&scene);
     hold_angles_in_degrees(&mut scene);
     if physical_lights {

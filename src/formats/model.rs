@@ -47,16 +47,18 @@ pub struct Contents {
 }
 
 impl Model {
-    /// Adds everything to a scene; the ledger is dropped.
-    pub fn append_to(self, scene: &mut Scene) {
-        let contents = self.append_assets(scene);
+    /// Adds everything to a scene; the ledger, with the numbers that meshes and materials have there.
+    pub fn append_to(self, scene: &mut Scene) -> Ledger {
+        let (contents, ledger) = self.append_assets(scene);
         scene.objects.extend(contents.objects);
         scene.cameras.extend(contents.cameras);
         scene.lights.extend(contents.lights);
+        ledger
     }
 
-    /// Adds meshes, materials and textures to a scene and returns what is to be placed in it.
-    pub fn append_assets(self, scene: &mut Scene) -> Contents {
+    /// Adds meshes, materials and textures to a scene and returns what is to be placed in it, and the ledger as
+    /// [`append_to`](Self::append_to) does.
+    pub fn append_assets(self, scene: &mut Scene) -> (Contents, Ledger) {
         let first_mesh = scene.meshes.len() as u32;
         let first_material = scene.materials.len() as u32;
         let first_texture = scene.textures.len() as u32;
@@ -79,12 +81,15 @@ impl Model {
             object.material = object.material.map(|material| material + first_material);
             object
         });
-        Contents {
+        let contents = Contents {
             objects: objects.collect(),
             cameras: self.cameras,
             lights: self.lights,
             physical_lights: self.physical_lights,
-        }
+        };
+        let mut ledger = self.ledger;
+        ledger.shift(first_material, first_mesh);
+        (contents, ledger)
     }
 }
 

@@ -2,12 +2,16 @@
 
 use std::sync::Arc;
 
+use std::collections::HashMap;
+
 use glam::{DVec3, Vec2, Vec3, Vec4};
 use robust::{Coord, orient2d};
 
 use crate::error::{Error, Result};
 use crate::geometry::bounds::Bounds;
+use crate::geometry::smoothing::angles;
 use crate::geometry::triangle::hit_bounds;
+use crate::math::vector::{cross, normalize};
 
 /// Triangles over shared vertices, with optional attributes per vertex; absent attributes take no memory.
 ///
@@ -164,8 +168,7 @@ impl TriangleMesh {
         for (number, indices) in self.indices.iter().enumerate() {
             let reason = match indices.map(|i| self.positions.get(i as usize).copied()) {
                 [Some(a), Some(b), Some(c)] => {
-                    let usable = |p: Vec3| p.abs().cmple(Vec3::splat(FARTHEST_COORDINATE)).all();
-                    if !(usable(a) && usable(b) && usable(c)) {
+                    if ![a, b, c].into_iter().all(is_usable) {
                         &mut counts.non_finite
                     } else if has_zero_area(a, b, c) {
                         &mut counts.zero_area
@@ -265,20 +268,14 @@ impl TriangleMesh {
     /// Replaces shading normals by ones computed from the faces: the mean of the faces around a vertex, weighted by
     /// their angle there (Thürmer and Wüthrich 1998), where positions are equal bit for bit.
     pub fn compute_normals(&mut self) {
-        use crate::math::vector::{cross, dot, normalize};
-        use std::collections::HashMap;
         let key = |p: Vec3| (p + Vec3::ZERO).to_array().map(f32::to_bits);
         let mut sums: HashMap<[u32; 3], DVec3> = HashMap::with_capacity(self.positions.len());
         for number in self.live_triangles() {
             let corners = self.triangle(number);
             let p = corners.map(|corner| corner.as_dvec3());
             let Some(face) = normalize(cross(p[1] - p[0], p[2] - p[0])) else { continue };
-            for i in 0..3 {
-                let (to_next, to_last) = (p[(i + 1) % 3] - p[i], p[(i + 2) % 3] - p[i]);
-                if let (Some(x), Some(y)) = (normalize(to_next), normalize(to_last)) {
-                    let angle = libm::acos(dot(x, y).clamp(-1.0, 1.0));
-                    *sums.entry(key(corners[i])).or_default() += face * angle;
-                }
+            for (corner, angle) in corners.into_iter().zip(angles(&p)) {
+                *sums.entry(key(corner)).or_default() += face * angle;
             }
         }
         let normal = |p: &Vec3| sums.get(&key(*p)).and_then(|&n| normalize(n)).unwrap_or(DVec3::ZERO).as_vec3();
@@ -333,6 +330,11 @@ impl TriangleMesh {
             + std::mem::size_of_val(self.groups.as_slice())
             + per_triangle
     }
+}
+
+/// Whether a triangle with this corner can be hit; NaN is not usable.
+pub(super) fn is_usable(corner: Vec3) -> bool {
+    corner.abs().cmple(Vec3::splat(FARTHEST_COORDINATE)).all()
 }
 
 /// Whether the vertices are collinear or coincide, decided exactly: the triangle's shadows on the three coordinate

@@ -4,13 +4,13 @@ pub mod bounds;
 pub mod doctor;
 pub mod hit;
 pub mod mesh;
-pub mod numbering;
+pub(crate) mod numbering;
 pub mod quadric;
 pub mod quadric_form;
 pub mod ray;
 pub mod shapes;
-pub mod smoothing;
-pub mod tangents;
+mod smoothing;
+mod tangents;
 pub mod triangle;
 
 pub use bounds::Bounds;

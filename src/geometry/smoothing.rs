@@ -121,7 +121,7 @@ impl TriangleMesh {
 }
 
 /// The angles of a triangle; 0 where an edge has no length.
-fn angles(p: &[DVec3; 3]) -> [f64; 3] {
+pub(super) fn angles(p: &[DVec3; 3]) -> [f64; 3] {
     let edges: [Option<DVec3>; 3] = std::array::from_fn(|i| normalize(p[(i + 1) % 3] - p[i]));
     std::array::from_fn(|i| match (edges[i], edges[(i + 2) % 3]) {
         (Some(to_next), Some(from_last)) => libm::acos(dot(to_next, -from_last).clamp(-1.0, 1.0)),
@@ -130,7 +130,7 @@ fn angles(p: &[DVec3; 3]) -> [f64; 3] {
 }
 
 /// For each vertex the first at the same place, bit for bit but for the sign of zeros.
-fn places(positions: &[Vec3]) -> Vec<u32> {
+pub(super) fn places(positions: &[Vec3]) -> Vec<u32> {
     let key = |vertex: u32| (positions[vertex as usize] + Vec3::ZERO).to_array().map(f32::to_bits);
     let mut order: Vec<u32> = (0..positions.len() as u32).collect();
     order.par_sort_unstable_by_key(|&vertex| (key(vertex), vertex));

@@ -12,7 +12,8 @@ use crate::math::vector::{cross, normalize};
 
 impl TriangleMesh {
     /// Computes [`tangents`](Self::tangents) from positions, normals and the first texture coordinates for the triangles whose
-    /// material is one that `wants` them. To be called before [`finish`](Self::finish).
+    /// material is one that `wants` them. Before or after [`finish`](Self::finish): triangles keep the positions of their corners. A
+    /// vertex that is missing must have the number 4294967295.
     ///
     /// A vertex at which tangents differ is split: copies of it go to the end of the arrays. Vertices of other triangles get
     /// zero, and so do those at which texture coordinates do not tell a direction. Where there are no shading normals the

@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3, Vec4};
 use crate::geometry::{Hit, TriangleMesh};
 use crate::math::vector::{cross, dot, length, normalize};
 use crate::render::answers::Answers;
-use crate::render::surface::{Place, SurfacePoint};
+use crate::render::surface::{Place, SurfacePoint, uv_at};
 use crate::render::trace::Tracer;
 use crate::render::world::{Instance, World};
 use crate::scene::detail::NormalMap;
@@ -52,11 +52,8 @@ impl<'a> ImagePlace<'a> {
 
     /// That of a point given by the weights of a triangle's corners, of no extent.
     fn on_triangle(scene: &'a Scene, mesh: &TriangleMesh, primitive: u32, weights: [f64; 3]) -> Self {
-        let uvs = [&mesh.uvs, &mesh.second_uvs].map(|uvs| {
-            let Some(uvs) = uvs else { return DVec2::ZERO };
-            let [a, b, c] = mesh.indices[primitive as usize].map(|i| uvs[i as usize].as_dvec2());
-            a * weights[0] + b * weights[1] + c * weights[2]
-        });
+        let uvs = [&mesh.uvs, &mesh.second_uvs]
+            .map(|uvs| uvs.as_ref().map_or(DVec2::ZERO, |uvs| uv_at(mesh, uvs, primitive, weights)));
         Self { scene, uvs, footprints: [0.0; 2] }
     }
 
@@ -113,27 +110,30 @@ impl<'a, I: Answers> Tracer<'a, I> {
         Cow::Owned(material.at(color, |used| place.texel(used)))
     }
 
-    /// What a surface that was hit lets through of light that travels in a direction, straight on: kt, or all of it where the surface is not
-    /// there.
+    /// What a surface that was hit lets through of light that travels in a direction, straight on: kt, or all of it where
+    /// the surface is not there.
     pub(super) fn passes(&self, hit: &Hit, direction: DVec3) -> Rgb {
         let material = self.material_hit(hit);
-        if !self.has_holes(hit) && !self.is_detailed(material, hit) {
-            return material.kt;
-        }
-        if self.is_hole(hit, direction) {
+        if self.shows_no_back(material, hit, direction) {
             return Rgb::ONE;
         }
-        self.at_hit(hit, |color, place| material.at(color, |used| place.texel(used)).kt)
+        match material.detail {
+            Some(_) => self.at_hit(hit, |color, place| material.passes_at(color, |used| place.texel(used))),
+            None => material.kt,
+        }
     }
 
     /// Whether the surface that a ray in this direction hit is not there.
     pub(super) fn is_hole(&self, hit: &Hit, direction: DVec3) -> bool {
         let material = self.material_hit(hit);
-        if material.single_sided && self.is_from_inside(hit, direction) {
-            return true;
-        }
-        material.has_alpha()
-            && self.at_hit(hit, |color, place| material.alpha_at(color, |used| place.texel(used))) == 0.0
+        self.shows_no_back(material, hit, direction)
+            || material.has_alpha()
+                && self.at_hit(hit, |color, place| material.alpha_at(color, |used| place.texel(used))) == 0.0
+    }
+
+    /// Whether a ray in this direction hit a back that is not there.
+    fn shows_no_back(&self, material: &Material, hit: &Hit, direction: DVec3) -> bool {
+        material.single_sided && self.is_from_inside(hit, direction)
     }
 
     /// Whether some of what was hit may not be there.
@@ -151,11 +151,10 @@ impl<'a, I: Answers> Tracer<'a, I> {
         hit
     }
 
-    /// Asks what vertices and images have where something was hit, texel by texel.
+    /// Asks what vertices and images have where a triangle was hit, texel by texel.
     fn at_hit<T>(&self, hit: &Hit, ask: impl FnOnce(Vec4, &ImagePlace<'_>) -> T) -> T {
-        let nowhere = ImagePlace { scene: self.scene, uvs: [DVec2::ZERO; 2], footprints: [0.0; 2] };
         let Shape::Mesh(mesh) = self.scene.objects[hit.instance as usize].shape else {
-            return ask(Vec4::ONE, &nowhere);
+            unreachable!("materials of quadrics have no detail")
         };
         let mesh = &self.scene.meshes[mesh as usize];
         let (u, v) = (f64::from(hit.u), f64::from(hit.v));

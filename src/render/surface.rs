@@ -1,9 +1,9 @@
 //! What shading needs of a hit point, made once for the winner, in f64.
 
-use glam::{DAffine3, DVec2, DVec3, Vec3};
+use glam::{DAffine3, DVec2, DVec3, Vec2, Vec3};
 
 use crate::geometry::triangle::hit_bounds_by_number;
-use crate::geometry::{Bounds, Hit, Quadric};
+use crate::geometry::{Bounds, Hit, Quadric, TriangleMesh};
 use crate::math::Transform;
 use crate::math::float::{gamma, round_down, round_up};
 use crate::math::vector::{cross, dot, is_safe, normal_and_length, normalize};
@@ -163,11 +163,9 @@ impl SurfacePoint {
     /// Texture coordinates of this point, which `hit` found; the origin if its mesh has none.
     pub fn texture_coordinates(&self, scene: &Scene, hit: &Hit) -> DVec2 {
         match (scene.objects[hit.instance as usize].shape, self.place) {
-            (Shape::Mesh(mesh), Place::Weights([wa, wb, wc])) => {
+            (Shape::Mesh(mesh), Place::Weights(weights)) => {
                 let mesh = &scene.meshes[mesh as usize];
-                let Some(uvs) = &mesh.uvs else { return DVec2::ZERO };
-                let [a, b, c] = mesh.indices[hit.primitive as usize].map(|i| uvs[i as usize].as_dvec2());
-                a * wa + b * wb + c * wc
+                mesh.uvs.as_ref().map_or(DVec2::ZERO, |uvs| uv_at(mesh, uvs, hit.primitive, weights))
             }
             (Shape::Quadric(quadric), Place::Point(position)) => {
                 scene.quadrics[quadric as usize].uv(position, hit.primitive)
@@ -194,6 +192,12 @@ impl SurfacePoint {
     fn origin_along(&self, normal: DVec3) -> Vec3 {
         moved_off(self.position, normal, self.offset)
     }
+}
+
+/// Texture coordinates, of one of a mesh's sets, at a point given by the weights of a triangle's corners.
+pub(super) fn uv_at(mesh: &TriangleMesh, uvs: &[Vec2], primitive: u32, [wa, wb, wc]: [f64; 3]) -> DVec2 {
+    let [a, b, c] = mesh.indices[primitive as usize].map(|i| uvs[i as usize].as_dvec2());
+    a * wa + b * wb + c * wc
 }
 
 /// A point a distance along a normal, rounded to f32 away from where it was.

@@ -202,18 +202,13 @@ impl<I: Answers> Tracer<'_, I> {
             let colors = match last {
                 Some((same, colors)) if same == number && !detailed => colors,
                 _ => {
-                    let material = &self.scene.materials[number as usize];
-                    let point = || (block.points.get(at), block.found.hits[at]);
-                    let terms = if detailed {
-                        self.terms(&block.points.get(at), &block.found.hits[at])
-                    } else {
-                        Cow::Borrowed(material)
-                    };
+                    let (point, hit) = (block.points.get(at), block.found.hits[at]);
+                    let terms = self.terms(&point, &hit);
                     block.is_glossy |= terms.ks != Rgb::ZERO;
                     block.goes_on |= terms.is_reflective() || terms.is_transmissive();
                     block.absorbs |= terms.is_absorbing();
-                    let colors = self.material_colors(&terms, point);
-                    last = (!detailed && material.diffuse_texture.is_none()).then_some((number, colors));
+                    let colors = self.material_colors(&terms, || (point, hit));
+                    last = (!detailed && terms.diffuse_texture.is_none()).then_some((number, colors));
                     if let Cow::Owned(terms) = terms {
                         block.points.materials[at] = (self.scene.materials.len() + block.local.len()) as u32;
                         block.local.push(terms);

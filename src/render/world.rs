@@ -93,7 +93,7 @@ impl World {
     /// Prepares the objects and lights of a scene.
     ///
     /// # Errors
-    /// Names the object whose transform is singular or not finite, the material that returns more light than it
+    /// Names the object whose transform is singular or not finite, the quadric whose material has detail, the material that returns more light than it
     /// receives, or the light without direction.
     pub fn new(scene: &Scene) -> Result<Self> {
         // Weights that were computed may exceed 1 by rounding.
@@ -123,6 +123,11 @@ impl World {
             let transform = Transform::new(relative(&object.transform, shape_origin, scale, scene.origin))
                 .map_err(|error| error.remedy(format!("object `{}`: scales must not be 0", object.name)))?;
             let traits = object.material.map_or(traits, |material| materials[material as usize]);
+            let material = scene.materials.get(object.material.unwrap_or(0) as usize);
+            if matches!(object.shape, Shape::Quadric(_)) && material.is_some_and(|material| material.detail.is_some()) {
+                let error = Error::caller(format!("object `{}`: a quadric's material has detail", object.name));
+                return Err(error.remedy("give it one without, such as `Material::at` returns"));
+            }
             let has_colors = match object.shape {
                 Shape::Mesh(mesh) => scene.meshes[mesh as usize].colors.is_some(),
                 Shape::Quadric(_) => false,

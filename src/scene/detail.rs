@@ -4,7 +4,7 @@
 use glam::Vec4;
 
 use crate::scene::microfacet::Surface;
-use crate::scene::{Material, Rgb, TextureRef};
+use crate::scene::{Material, Rgb, TextureRef, luminance};
 
 /// What a material's terms are at each point.
 #[derive(Debug, Clone, PartialEq)]
@@ -62,7 +62,7 @@ pub enum AlphaMode {
 }
 
 /// Which of an image's values is meant.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Channel {
     /// The first.
     Red,
@@ -240,7 +240,7 @@ impl Channel {
             Self::Green => texel.y,
             Self::Blue => texel.z,
             Self::Alpha => texel.w,
-            Self::Luminance => 0.2126 * texel.x + 0.7152 * texel.y + 0.0722 * texel.z,
+            Self::Luminance => luminance(texel.truncate()) as f32,
         }
     }
 }

@@ -3,8 +3,8 @@
 use glam::DVec3;
 
 use crate::math::vector::{dot, normalize};
-use crate::scene::outline;
-use crate::scene::{Falloff, Light, LightKind, Rgb, Scene};
+use crate::scene::{Falloff, Light, LightKind, Scene};
+use crate::scene::{luminance, outline};
 
 /// How bright the lights together shall make a surface that faces them: a little less than the studio lights of a bare
 /// model, since there is room above for highlights and for surfaces near a lamp.
@@ -45,16 +45,11 @@ fn irradiance(light: &Light, p: DVec3) -> f64 {
     share * luminance(light.color)
 }
 
-/// Luminance of a linear colour (Rec. 709).
-fn luminance(color: Rgb) -> f64 {
-    0.2126 * f64::from(color.x) + 0.7152 * f64::from(color.y) + 0.0722 * f64::from(color.z)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::geometry::shapes;
-    use crate::scene::{Object, Shape};
+    use crate::scene::{Object, Rgb, Shape};
     use glam::DAffine3;
 
     /// A unit sphere far from the origin, 100 away along z from where lights stand.

@@ -110,10 +110,14 @@ impl Material {
         self.kt != Rgb::ZERO
     }
 
+    /// Whether light may pass where the surface is.
+    fn may_transmit(&self) -> bool {
+        self.is_transmissive() || self.detail.as_ref().is_some_and(|detail| detail.rule.transmits())
+    }
+
     /// Whether light may pass somewhere: then shadow rays are attenuated, not blocked.
     pub fn lets_light_through(&self) -> bool {
-        let transmits = |detail: &Detail| detail.rule.transmits();
-        self.is_transmissive() || self.has_holes() || self.detail.as_deref().is_some_and(transmits)
+        self.may_transmit() || self.has_holes()
     }
 
     /// Whether the surface may not be there at some points.
@@ -182,6 +186,13 @@ impl Material {
         let Some(alpha) = self.detail.as_ref().and_then(|detail| detail.alpha.as_ref()) else { return 1.0 };
         let base = self.diffuse_texture.as_ref().map_or(1.0, |texture| texel(texture).w);
         alpha.at(color.w * base, texel)
+    }
+
+    /// kt of a point, given as for [`at`](Self::at), 1 for a hole: what [`at`](Self::at) says, without its other terms where
+    /// they play no part.
+    pub fn passes_at(&self, color: Vec4, texel: impl Fn(&TextureRef) -> Vec4) -> Rgb {
+        let alpha = self.alpha_at(color, &texel);
+        if alpha > 0.0 && self.may_transmit() { self.at(color, texel).kt } else { Rgb::splat(1.0 - alpha) }
     }
 
     /// The terms of a surface of which only a share is there and hides what lies behind, straight on: alpha blending.

@@ -15,6 +15,7 @@ pub mod needs;
 pub mod object;
 pub mod origin;
 mod outline;
+pub mod quantize;
 pub mod room;
 pub mod texture;
 
@@ -34,6 +35,11 @@ use crate::geometry::{Quadric, TriangleMesh};
 
 /// A linear colour or weight, red, green, blue (Rec. 709 primaries).
 pub type Rgb = glam::Vec3;
+
+/// Luminance of a linear colour (Rec. 709).
+pub fn luminance(color: Rgb) -> f64 {
+    0.2126 * f64::from(color.x) + 0.7152 * f64::from(color.y) + 0.0722 * f64::from(color.z)
+}
 
 /// A whole scene.
 ///

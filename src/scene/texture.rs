@@ -5,7 +5,8 @@ use std::sync::{Arc, LazyLock};
 use glam::{DVec2, Vec4};
 use rayon::prelude::*;
 
-use crate::scene::Rgb;
+use crate::scene::quantize::byte;
+use crate::scene::{Rgb, Transfer};
 
 /// What happens to texture coordinates outside [0, 1).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
@@ -54,7 +55,7 @@ impl Texels {
 
     /// One of them, linear; with an alpha of 1 where there is none.
     #[inline(always)]
-    fn get(&self, at: usize) -> Vec4 {
+    pub(crate) fn get(&self, at: usize) -> Vec4 {
         match self {
             Self::Srgb8(texels) => {
                 let [r, g, b, a] = texels[at].map(usize::from);
@@ -239,16 +240,15 @@ fn halved(texels: &Texels, width: u32, height: u32, by_alpha: bool) -> Texels {
             color.extend(plain.w)
         })
     };
-    let byte = |value: f64| (value.clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
     let srgb = |texel: Vec4| {
-        let [r, g, b] = texel.truncate().to_array().map(|value| byte(linear_to_srgb(f64::from(value))));
-        [r, g, b, byte(f64::from(texel.w))]
+        let [r, g, b] = texel.truncate().to_array().map(|value| byte(value, Transfer::Srgb));
+        [r, g, b, byte(texel.w, Transfer::Linear)]
     };
     let rows = (0..to_height).into_par_iter().flat_map_iter(row);
     match texels {
         Texels::Srgb8(_) => Texels::Srgb8(rows.map(srgb).collect::<Vec<_>>().into()),
         Texels::Data8(_) => {
-            let data = |texel: Vec4| texel.to_array().map(|value| byte(f64::from(value)));
+            let data = |texel: Vec4| texel.to_array().map(|value| byte(value, Transfer::Linear));
             Texels::Data8(rows.map(data).collect::<Vec<_>>().into())
         }
         Texels::Linear32(_) => {

@@ -43,13 +43,13 @@ pub(super) fn pose(
     if !time.is_finite() {
         return Err(Error::caller(format!("there is nothing to show at a time of {time} seconds")));
     }
-    let wanted = options.animation.as_deref().unwrap_or(FIRST);
-    if count == 0 && wanted == FIRST {
+    if count == 0 && options.animation.is_none() {
         ledger.note(Treatment::Warning, "a time is given, but the file has no animation", 1);
         return Ok(pose);
     }
     let names = document.animations.iter().map(|animation| animation.name.as_deref());
-    let animation = &document.animations[choose("animation", wanted, names)?];
+    let wanted = options.animation.as_deref().map(|wanted| choose("animation", wanted, names)).transpose()?;
+    let animation = &document.animations[wanted.unwrap_or(0)];
     if count > 1 {
         ledger.note(Treatment::Ignored, "other animation (see --animation)", count - 1);
     }
@@ -68,9 +68,6 @@ pub(super) fn pose(
     }
     Ok(pose)
 }
-
-/// What the first animation is called where none is named.
-const FIRST: &str = "0";
 
 struct Mover<'a, 'b> {
     document: &'a Document,

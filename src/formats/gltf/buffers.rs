@@ -75,14 +75,7 @@ impl<'a> Buffers<'a> {
     /// As [`locate`](Self::locate); the system's.
     pub fn view(&self, root: &Root, view: Index<buffer::View>) -> Result<Cow<'_, [u8]>> {
         let (buffer, range) = self.locate(root, view)?;
-        match buffer {
-            Bytes::Memory(bytes) => Ok(Cow::Borrowed(&bytes[range.start as usize..range.end as usize])),
-            Bytes::File(..) => {
-                let mut bytes = Vec::new();
-                buffer.read(range, &mut bytes)?;
-                Ok(Cow::Owned(bytes))
-            }
-        }
+        buffer.part(range)
     }
 
     /// The buffer that a view is of, and which of its bytes.
@@ -123,7 +116,7 @@ fn open(path: &Path, limits: &Limits) -> Result<Bytes<'static>> {
         Ok(metadata) if metadata.is_file() => {
             let in_file = |error: Error| error.within(format_args!("`{}`", path.display()));
             limits.check_file_bytes(metadata.len()).map_err(in_file)?;
-            Bytes::open(path)
+            Bytes::open(path, limits)
         }
         Ok(_) => Err(missing("is not a file")),
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Err(missing("is missing")),

@@ -112,9 +112,7 @@ impl Builder {
         if mode == NormalMode::Smooth {
             mesh.compute_normals();
             if self.lacks_tangents {
-                // They add vertices, after which which triangles can be hit is found again.
                 mesh.compute_tangents(&wants)?;
-                mesh = mesh.finish()?;
             }
         }
         Ok(mesh)

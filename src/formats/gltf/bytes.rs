@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::error::{Error, Result};
+use crate::formats::Limits;
 
 /// A run of bytes.
 #[derive(Debug, Clone)]
@@ -36,16 +37,15 @@ impl<'a> Bytes<'a> {
     /// All bytes of a file. What is no regular file, such as a pipe, is read at once.
     ///
     /// # Errors
-    /// The system's, with the path.
-    pub fn open(path: &Path) -> Result<Self> {
+    /// A limit, or the system's, both with the path.
+    pub fn open(path: &Path, limits: &Limits) -> Result<Self> {
         let failed = |error| Error::system(path, error);
-        let mut file = File::open(path).map_err(failed)?;
-        let metadata = file.metadata().map_err(failed)?;
+        let metadata = std::fs::metadata(path).map_err(failed)?;
         if !metadata.is_file() {
-            let mut bytes = Vec::new();
-            file.read_to_end(&mut bytes).map_err(failed)?;
-            return Ok(Self::Memory(Cow::Owned(bytes)));
+            return Ok(Self::Memory(Cow::Owned(limits.read_file(path)?)));
         }
+        limits.check_file_bytes(metadata.len()).map_err(|error| error.at_path(path))?;
+        let file = File::open(path).map_err(failed)?;
         Ok(Self::File(Arc::new(OpenFile { path: path.to_path_buf(), file: Mutex::new(file) }), 0..metadata.len()))
     }
 
@@ -95,11 +95,19 @@ impl<'a> Bytes<'a> {
     /// # Errors
     /// As [`read`](Self::read).
     pub fn all(&self) -> Result<Cow<'_, [u8]>> {
+        self.part(0..self.len())
+    }
+
+    /// A range of them, which must not reach beyond the end.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub fn part(&self, range: Range<u64>) -> Result<Cow<'_, [u8]>> {
         match self {
-            Self::Memory(bytes) => Ok(Cow::Borrowed(bytes)),
+            Self::Memory(bytes) => Ok(Cow::Borrowed(&bytes[usize_range(&range)])),
             Self::File(..) => {
                 let mut bytes = Vec::new();
-                self.read(0..self.len(), &mut bytes)?;
+                self.read(range, &mut bytes)?;
                 Ok(Cow::Owned(bytes))
             }
         }
@@ -129,7 +137,7 @@ mod tests {
         let content: Vec<u8> = (0..=255).collect();
         let path = tempfile::NamedTempFile::new().unwrap().into_temp_path();
         std::fs::write(&path, &content).unwrap();
-        let both = [Bytes::open(&path).unwrap(), Bytes::Memory(Cow::Borrowed(&content))];
+        let both = [Bytes::open(&path, &Limits::default()).unwrap(), Bytes::Memory(Cow::Borrowed(&content))];
         for bytes in both {
             assert_eq!(bytes.len(), 256);
             assert_eq!(bytes.all().unwrap(), content);
@@ -145,7 +153,7 @@ mod tests {
     fn a_file_that_shrinks_is_an_error() {
         let path = tempfile::NamedTempFile::new().unwrap().into_temp_path();
         std::fs::write(&path, [0; 64]).unwrap();
-        let bytes = Bytes::open(&path).unwrap();
+        let bytes = Bytes::open(&path, &Limits::default()).unwrap();
         std::fs::write(&path, [0; 8]).unwrap();
         assert_eq!(bytes.all().unwrap_err().fault(), crate::error::Fault::System);
     }

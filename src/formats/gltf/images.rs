@@ -1,8 +1,10 @@
 //! Images, each decoded once, and the textures that read them.
 
 use std::borrow::Cow;
+use std::cell::OnceCell;
 use std::collections::{BTreeSet, HashMap};
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use ::gltf::json::texture::{MagFilter, MinFilter, WrappingMode};
 use ::gltf::json::validation::Checked;
@@ -16,7 +18,7 @@ use crate::error::{Error, Result};
 use crate::formats::image_file::{decode_texture, read_texture};
 use crate::formats::surroundings::Surroundings;
 use crate::formats::{Ledger, Limits, Treatment};
-use crate::scene::texture::{Filter, Texels, Wrap, srgb_to_linear};
+use crate::scene::texture::{Filter, Level, Texels, Wrap, srgb_to_linear};
 use crate::scene::{Rgb, Texture, TextureRef};
 
 /// The images of a file and the textures made of them so far.
@@ -27,8 +29,10 @@ pub(super) struct Textures<'a> {
     images: Vec<Option<Texture>>,
     /// What materials refer to, in order of first use.
     made: Vec<Texture>,
-    /// The mean of each.
-    means: Vec<Vec4>,
+    /// The mean of each, once it was asked for.
+    means: Vec<OnceCell<Vec4>>,
+    /// Smaller versions by image number: textures share them, however they read the image.
+    levels: HashMap<(usize, Encoding), Arc<[Level]>>,
     /// From a texture's number in the file to its place in `made`.
     places: HashMap<(usize, Encoding), u32>,
 }
@@ -76,7 +80,7 @@ impl<'a> Textures<'a> {
                 }
             }
         }
-        Self { root, images, made: Vec::new(), means: Vec::new(), places: HashMap::new() }
+        Self { root, images, made: Vec::new(), means: Vec::new(), levels: HashMap::new(), places: HashMap::new() }
     }
 
     /// How a material refers to a texture, its transform included; `None` if its image could not be read.
@@ -85,10 +89,15 @@ impl<'a> Textures<'a> {
         let place = match self.places.get(&(number, encoding)) {
             Some(&place) => place,
             None => {
-                let image = self.images[image_of(self.root, info.index)?].as_ref()?;
+                let image_number = image_of(self.root, info.index)?;
+                let image = self.images[image_number].as_ref()?;
                 let place = u32::try_from(self.made.len()).ok()?;
-                let texture = sampled(self.root, number, image, encoding);
-                self.means.push(mean(&texture));
+                let (mut texture, has_levels) = sampled(self.root, number, image, encoding);
+                if has_levels {
+                    let levels = self.levels.entry((image_number, encoding));
+                    texture.levels = levels.or_insert_with(|| levels_of(texture.clone(), encoding)).clone();
+                }
+                self.means.push(OnceCell::new());
                 self.made.push(texture);
                 self.places.insert((number, encoding), place);
                 place
@@ -99,7 +108,8 @@ impl<'a> Textures<'a> {
 
     /// The mean of what a texture has, linear.
     pub fn mean(&self, texture: &TextureRef) -> Vec4 {
-        self.means[texture.texture as usize]
+        let number = texture.texture as usize;
+        *self.means[number].get_or_init(|| mean(&self.made[number]))
     }
 
     /// The textures that materials refer to.
@@ -159,8 +169,8 @@ fn image_name(root: &Root, number: usize) -> String {
     root.images[number].name.clone().unwrap_or_else(|| format!("image {number}"))
 }
 
-/// The image as a texture's sampler reads it.
-fn sampled(root: &Root, texture: usize, image: &Texture, encoding: Encoding) -> Texture {
+/// The image as a texture's sampler reads it, without smaller versions; and whether it wants them.
+fn sampled(root: &Root, texture: usize, image: &Texture, encoding: Encoding) -> (Texture, bool) {
     let sampler = root.textures[texture].sampler.and_then(|sampler| root.samplers.get(sampler.value()));
     let wrap = |mode: Option<Checked<WrappingMode>>| match mode {
         Some(Checked::Valid(WrappingMode::ClampToEdge)) => Wrap::Clamp,
@@ -180,12 +190,16 @@ fn sampled(root: &Root, texture: usize, image: &Texture, encoding: Encoding) -> 
         (Texels::Srgb8(texels), Encoding::Numbers) => Texels::Data8(texels.clone()),
         (texels, _) => texels.clone(),
     };
-    let texture = Texture { wrap, filter, texels, ..image.clone() };
-    match encoding {
-        _ if !has_levels => texture,
+    (Texture { wrap, filter, texels, ..image.clone() }, has_levels)
+}
+
+/// The smaller versions of an image.
+fn levels_of(texture: Texture, encoding: Encoding) -> Arc<[Level]> {
+    let texture = match encoding {
         Encoding::SrgbWithAlpha => texture.with_levels(),
         Encoding::Srgb | Encoding::Numbers => texture.with_plain_levels(),
-    }
+    };
+    texture.levels
 }
 
 /// KHR_texture_transform, which is for coordinates whose v goes down, for those whose v goes up: with `F (u, v) = (u, 1 - v)`

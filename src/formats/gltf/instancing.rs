@@ -15,6 +15,11 @@ use crate::scene::Object;
 /// The name of the extension.
 pub(super) const EXTENSION: &str = "EXT_mesh_gpu_instancing";
 
+/// What a node has of it.
+pub(super) fn extension(node: &Node) -> Option<&Value> {
+    node.extensions.as_ref()?.others.get(EXTENSION)
+}
+
 /// The transforms of a node's instances relative to the node, or `None` if it is not instanced.
 ///
 /// # Errors
@@ -26,9 +31,7 @@ pub(super) fn instances(
     budget: &mut Budget,
     ledger: &mut Ledger,
 ) -> Result<Option<Vec<DAffine3>>> {
-    let Some(extension) = node.extensions.as_ref().and_then(|extensions| extensions.others.get(EXTENSION)) else {
-        return Ok(None);
-    };
+    let Some(extension) = extension(node) else { return Ok(None) };
     let attributes = extension.get("attributes");
     let open = |name: &str| -> Result<Option<Accessor<'_>>> {
         let Some(value) = attributes.and_then(|attributes| attributes.get(name)) else { return Ok(None) };

@@ -40,7 +40,8 @@ impl MaterialReader<'_, '_> {
         let single_sided = single_sided && !reading.is_solid();
         reading.note_what_is_plain();
         let material = if is_unlit(source) { reading.unlit() } else { reading.shaded() };
-        let colors = [material.emission, material.diffuse, material.specular, material.ks, material.kr, material.kt];
+        let Material { emission, diffuse, specular, ks, kr, kt, absorption, .. } = &material;
+        let colors = [emission, diffuse, specular, ks, kr, kt, absorption];
         if colors.iter().all(|color| color.is_finite()) && material.ior.is_finite() {
             return Material { name, single_sided, ..material };
         }
@@ -51,22 +52,24 @@ impl MaterialReader<'_, '_> {
 
 /// The textures that reading a material will ask for.
 pub(super) fn textures_of(source: &Source) -> impl Iterator<Item = Index<Texture>> {
-    let (pbr, extensions) = (&source.pbr_metallic_roughness, source.extensions.as_ref());
-    let data = match specular_glossiness(source) {
-        Some(specular) => specular.specular_glossiness_texture.as_ref(),
-        None => pbr.metallic_roughness_texture.as_ref(),
-    };
+    let lit = (!is_unlit(source)).then_some(source);
+    let emits = source.emissive_factor.0.iter().any(|&channel| channel > 0.0);
+    let specular_glossiness = specular_glossiness(source);
+    let metallic = lit.filter(|_| specular_glossiness.is_none());
+    let extensions = metallic.and_then(|source| source.extensions.as_ref());
     let specular = extensions.and_then(|extensions| extensions.specular.as_ref());
     let transmission = extensions.and_then(|extensions| extensions.transmission.as_ref());
     let infos = [
         base_texture(source),
-        data,
-        source.emissive_texture.as_ref(),
+        lit.and(specular_glossiness).and_then(|specular| specular.specular_glossiness_texture.as_ref()),
+        metallic.and_then(|source| source.pbr_metallic_roughness.metallic_roughness_texture.as_ref()),
+        lit.filter(|_| emits).and_then(|source| source.emissive_texture.as_ref()),
         specular.and_then(|specular| specular.specular_texture.as_ref()),
         specular.and_then(|specular| specular.specular_color_texture.as_ref()),
         transmission.and_then(|transmission| transmission.transmission_texture.as_ref()),
     ];
-    infos.into_iter().flatten().map(|info| info.index).chain(source.normal_texture.iter().map(|normal| normal.index))
+    let normal = lit.and_then(|source| source.normal_texture.as_ref());
+    infos.into_iter().flatten().map(|info| info.index).chain(normal.map(|normal| normal.index))
 }
 
 /// The materials of primitives whose vertices have colours, by number; that of those without one follows the last.

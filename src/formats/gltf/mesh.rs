@@ -189,10 +189,9 @@ impl<'a> Part<'a, '_> {
             self.ledger.note(Treatment::Warning, "vertices left over after the last triangle", left);
         }
         let (first, count) = (self.first, self.count);
-        let reserve = |builder: &mut Builder, vertices: usize| {
-            u32::try_from(first + vertices).map_err(|_| Error::limit("more than 4294967295 vertices in a mesh"))?;
-            let no_memory = |_| Error::limit("not enough memory for the triangles");
-            builder.indices.try_reserve(triangle_count).map_err(no_memory)
+        let check = |vertices: usize| {
+            let too_many = |_| Error::limit("more than 4294967295 vertices in a mesh");
+            u32::try_from(first + vertices).map_err(too_many)
         };
         let whole = |number: u32| if (number as usize) < count { first as u32 + number } else { NO_VERTEX };
         // A primitive that uses few vertices of a large shared array takes those alone.
@@ -200,7 +199,7 @@ impl<'a> Part<'a, '_> {
         if !selects {
             self.budget.take_vertices(count)?;
             if let (Some(indices), Mode::Triangles) = (&indices, mode) {
-                u32::try_from(first + count).map_err(|_| Error::limit("more than 4294967295 vertices in a mesh"))?;
+                check(count)?;
                 return indices.triangles(&mut builder.indices, whole);
             }
         }
@@ -209,7 +208,9 @@ impl<'a> Part<'a, '_> {
         if let Some(selection) = &self.selection {
             self.budget.take_vertices(selection.len())?;
         }
-        reserve(builder, self.vertex_count())?;
+        check(self.vertex_count())?;
+        let no_memory = |_| Error::limit("not enough memory for the triangles");
+        builder.indices.try_reserve(triangle_count).map_err(no_memory)?;
         let vertex = |corner: usize| -> u32 {
             let number = corners.as_ref().map_or(corner as u32, |corners| corners[corner]);
             match &self.selection {

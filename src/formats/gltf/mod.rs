@@ -39,7 +39,7 @@ use std::path::Path;
 
 use ::gltf::json::Root;
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::formats::surroundings::Surroundings;
 use crate::formats::{Ledger, LoadOptions, Model};
 use crate::progress::Progress;
@@ -69,10 +69,8 @@ use shown::Shown;
 /// out of bounds; unsupported for required extensions that are not read; a limit for what does not fit memory; a caller's
 /// for a scene or animation that does not exist.
 pub fn load(path: &Path, options: &LoadOptions, progress: &dyn Progress) -> Result<Model> {
-    let size = std::fs::metadata(path).map_err(|cause| Error::system(path, cause))?.len();
-    options.limits.check_file_bytes(size).map_err(|error| error.at_path(path))?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    let read = || read_bytes(&Bytes::open(path)?, folder, options, progress);
+    let read = || read_bytes(&Bytes::open(path, &options.limits)?, folder, options, progress);
     let mut model = read().map_err(|error| error.at_path(path))?;
     model.ledger.note_file(path);
     Ok(model)

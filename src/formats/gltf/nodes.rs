@@ -5,6 +5,7 @@ use glam::{DAffine3, DMat3, DVec3, DVec4};
 
 use super::choice::choose;
 use super::document::Placement;
+use super::sampler::length;
 use crate::error::{Error, Result};
 use crate::formats::{Ledger, Limits, Treatment, UpAxis};
 use crate::math::transform::{compose, rotation_by};
@@ -86,11 +87,16 @@ fn roots(root: &Root, scene: Option<usize>) -> Vec<Index<Node>> {
     (0..root.nodes.len()).filter(|&number| !is_child[number]).map(|number| Index::new(number as u32)).collect()
 }
 
-/// From the node's space to its parent's. The last row of a matrix, which glTF demands to be 0 0 0 1, is not read.
+/// A column-major matrix, whose last row, which glTF demands to be 0 0 0 1, is not read.
+pub(super) fn affine(m: &[f64; 16]) -> DAffine3 {
+    let column = |i: usize| DVec3::new(m[4 * i], m[4 * i + 1], m[4 * i + 2]);
+    DAffine3 { matrix3: DMat3::from_cols(column(0), column(1), column(2)), translation: column(3) }
+}
+
+/// From the node's space to its parent's.
 fn local(placement: &Placement, ledger: &mut Ledger) -> DAffine3 {
-    if let Some(m) = &placement.matrix {
-        let column = |i: usize| DVec3::new(m[4 * i], m[4 * i + 1], m[4 * i + 2]);
-        return DAffine3 { matrix3: DMat3::from_cols(column(0), column(1), column(2)), translation: column(3) };
+    if let Some(matrix) = &placement.matrix {
+        return affine(matrix);
     }
     let rotation = DVec4::from(placement.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]));
     scale_rotate_translate(
@@ -108,8 +114,7 @@ pub(super) fn scale_rotate_translate(
     scale: DVec3,
     ledger: &mut Ledger,
 ) -> DAffine3 {
-    let length =
-        (rotation.x * rotation.x + rotation.y * rotation.y + rotation.z * rotation.z + rotation.w * rotation.w).sqrt();
+    let length = length(rotation);
     let unit = if length > 0.0 && length < f64::INFINITY {
         rotation / length
     } else {

@@ -17,7 +17,7 @@ pub(super) struct Posing<'a> {
     targets: Vec<(&'a std::collections::BTreeMap<String, serde_json::Value>, f64)>,
     /// For each vertex; empty without a skin.
     motions: Vec<Motion>,
-    /// Whether the mesh is morphed or posed, in this primitive or another.
+    /// Whether the mesh is neither morphed nor posed, in any of its primitives.
     is_plain: bool,
 }
 

@@ -156,7 +156,8 @@ fn quaternion(numbers: &[f64]) -> DVec4 {
     DVec4::from_slice(numbers)
 }
 
-fn length(q: DVec4) -> f64 {
+/// The length of a quaternion.
+pub(super) fn length(q: DVec4) -> f64 {
     (q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w).sqrt()
 }
 

@@ -179,26 +179,24 @@ impl<'a> Shown<'a> {
         budget: &mut Budget,
         ledger: &mut Ledger,
     ) -> Result<()> {
-        let root = &self.document.root;
-        let instances = instancing::instances(root, reader.buffers, placed.node, budget, ledger)
-            .map_err(|error| error.within(format_args!("nodes[{}]", placed.number)))?;
+        let instances = match is_skinned {
+            true => None,
+            false => instancing::instances(&self.document.root, reader.buffers, placed.node, budget, ledger)
+                .map_err(|error| error.within(format_args!("nodes[{}]", placed.number)))?,
+        };
+        if is_skinned && instancing::extension(placed.node).is_some() {
+            let name = instancing::EXTENSION;
+            let text = format!("{name} of a node with a skin, whose own place does not count: shown once");
+            ledger.note_in(Treatment::Ignored, text, Scope::Mesh(place));
+        }
         let transforms = match instances {
-            Some(_) if is_skinned => {
-                let text = format!(
-                    "{} of a node with a skin, whose own place does not count: shown once",
-                    instancing::EXTENSION
-                );
-                ledger.note_in(Treatment::Ignored, text, Scope::Mesh(place));
-                vec![DAffine3::IDENTITY]
-            }
-            None if is_skinned => vec![DAffine3::IDENTITY],
             Some(instances) => {
                 ledger.note_in(Treatment::Honoured, "instances of a mesh", Scope::Mesh(place));
                 instances.into_iter().map(|instance| compose(&placed.to_world, &instance)).collect()
             }
             None => {
                 budget.take::<Object>(1)?;
-                vec![placed.to_world]
+                vec![if is_skinned { DAffine3::IDENTITY } else { placed.to_world }]
             }
         };
         let name = placed.name();

@@ -6,6 +6,7 @@ use glam::{DAffine3, DMat3, DVec3, Vec4};
 use super::accessor::Accessor;
 use super::budget::Budget;
 use super::buffers::Buffers;
+use super::nodes::affine;
 use crate::error::{Error, Result};
 use crate::math::transform::{apply, compose, point};
 use crate::math::vector::{cross, dot};
@@ -133,10 +134,4 @@ impl Motion {
     pub fn normal(&self, n: DVec3) -> DVec3 {
         apply(&self.for_normals, n)
     }
-}
-
-/// A column-major matrix, whose last row, which glTF demands to be 0 0 0 1, is not read.
-fn affine(m: &[f64; 16]) -> DAffine3 {
-    let column = |i: usize| DVec3::new(m[4 * i], m[4 * i + 1], m[4 * i + 2]);
-    DAffine3 { matrix3: DMat3::from_cols(column(0), column(1), column(2)), translation: column(3) }
 }

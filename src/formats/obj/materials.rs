@@ -120,8 +120,9 @@ impl<'a> Reading<'a, '_> {
         opacity: Option<f32>,
     ) -> (Option<Alpha>, bool) {
         let Some(map) = self.map(statement) else { return (None, false) };
-        let varies = self.textures.image(&map).is_some_and(has_varying_alpha);
-        let channel = map.statement.channel.unwrap_or(if varies { Channel::Alpha } else { Channel::Luminance });
+        let varies = || self.textures.image(&map).is_some_and(has_varying_alpha);
+        let channel =
+            map.statement.channel.unwrap_or_else(|| if varies() { Channel::Alpha } else { Channel::Luminance });
         let is_own = |diffuse: &&Map<'a>| {
             let (own, other) = (&map.statement, &diffuse.statement);
             diffuse.path == map.path && own.is_placed_as(other) && own.base_gain == other.base_gain

@@ -83,7 +83,6 @@ pub fn read(reader: impl BufRead, path: &Path, options: &LoadOptions, progress: 
     let name = path.file_stem().map_or_else(|| "mesh".into(), |stem| stem.to_string_lossy());
     let (mut mesh, material_names) =
         mesh::build(parsed, &name, options, progress, &mut ledger).map_err(|error| error.at_path(path))?;
-    options.limits.check_vertices(mesh.positions.len() as u64).map_err(|error| error.at_path(path))?;
     rounding::note(&mesh.rounding, &name, &mut ledger);
 
     let surroundings = Surroundings::of(path, options);
@@ -95,8 +94,12 @@ pub fn read(reader: impl BufRead, path: &Path, options: &LoadOptions, progress: 
         ledger.note_in(Treatment::Approximated, feature, Scope::Mesh(0));
     }
     let has_normal_map = |material: &Material| material.detail.as_ref().is_some_and(|detail| detail.normal.is_some());
-    mesh.compute_tangents(|number| materials.get(number as usize).is_some_and(has_normal_map))
-        .map_err(|error| error.at_path(path))?;
+    // Without shading normals the renderer takes the directions of each triangle's texture coordinates.
+    if mesh.normals.is_some() {
+        mesh.compute_tangents(|number| materials.get(number as usize).is_some_and(has_normal_map))
+            .map_err(|error| error.at_path(path))?;
+    }
+    options.limits.check_vertices(mesh.positions.len() as u64).map_err(|error| error.at_path(path))?;
     let object =
         Object { name: name.into_owned(), shape: Shape::Mesh(0), transform: options.up.to_y(), material: None };
     Ok(Model { meshes: vec![mesh], materials, textures, objects: vec![object], ledger, ..Default::default() })

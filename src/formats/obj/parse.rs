@@ -52,7 +52,6 @@ pub(super) struct Parsed {
 /// How often something was worked around or left out within a statement.
 #[derive(Default)]
 struct Counts {
-    colors: u64,
     weights: u64,
     further_numbers: u64,
     small_faces: u64,
@@ -124,20 +123,20 @@ impl Parsed {
 
     /// What stands in a `v` statement after the coordinates: a weight, a colour, or more.
     fn after_position<'a>(&mut self, first: &str, mut words: impl Iterator<Item = &'a str>) -> Result<()> {
-        let mut color = [f32::NAN; 3];
+        let mut color = None;
         match (words.next(), words.next(), words.next()) {
             (Some(second), Some(third), None) => {
-                color = [first, second, third].map(|word| word.parse::<f64>().map_or(f32::NAN, |value| value as f32));
-                self.counts.colors += 1;
+                let value = |word: &str| word.parse::<f64>().map_or(f32::NAN, |value| value as f32);
+                color = Some([first, second, third].map(value));
             }
             (_, None, _) => self.counts.weights += 1,
             _ => self.counts.further_numbers += 1,
         }
-        if self.colors.is_empty() && self.counts.colors > 0 {
+        if color.is_some() && self.colors.is_empty() {
             self.colors.resize(self.positions.len() - 1, [f32::NAN; 3]);
         }
-        if self.counts.colors > 0 {
-            self.colors.push(color);
+        if color.is_some() || !self.colors.is_empty() {
+            self.colors.push(color.unwrap_or([f32::NAN; 3]));
         }
         Ok(())
     }
@@ -464,16 +463,19 @@ mod tests {
 
     #[test]
     fn everything_left_out_is_in_the_ledger() {
-        let mut text = "p 1\nl 1 2\nl 2 3\nbevel on\nf 1 2\ncurv 1 2 3\n".to_owned();
+        let mut text = "p 1\nl 1 2\nl 2 3\nbevel on\nf 1 2\ncurv 1 2 3\nv 0 0 0 1\nfo 1 1 1\n".to_owned();
         (0..100).for_each(|i| text += &format!("word{i}\n"));
         let mut ledger = Ledger::default();
         parse(&text).unwrap().finish(&mut ledger);
         let entries: Vec<_> = ledger.entries().collect();
         assert!(entries.contains(&(Treatment::Ignored, "lines (l)", 2)));
         assert!(entries.contains(&(Treatment::Ignored, "points (p)", 1)));
+        assert!(entries.contains(&(Treatment::Ignored, "display attributes (bevel)", 1)));
+        assert!(entries.contains(&(Treatment::Ignored, "vertex weights (v with 4 numbers)", 1)));
+        assert!(entries.contains(&(Treatment::Honoured, "faces (f)", 1)));
         assert!(entries.contains(&(Treatment::Ignored, "free-form curves and surfaces (curv)", 1)));
         assert!(entries.contains(&(Treatment::Warning, "face with fewer than 3 corners: left out", 1)));
-        assert!(entries.len() < MOST_KEYWORDS + 5);
-        assert_eq!(entries.iter().map(|entry| entry.2).sum::<u64>(), 106);
+        assert!(entries.len() < MOST_KEYWORDS + 7);
+        assert_eq!(entries.iter().map(|entry| entry.2).sum::<u64>(), 108);
     }
 }

@@ -403,7 +403,9 @@ fn load_material(mtl: &str, images: &[(&str, image::DynamicImage)]) -> Model {
     for (name, image) in images {
         image.save(folder.path().join(name)).unwrap();
     }
-    let obj = format!("mtllib m.mtl\n{SQUARE}vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3 4/4\n");
+    let obj = format!(
+        "mtllib m.mtl\n{SQUARE}vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 0 1\nusemtl m\nf 1/1/1 2/2/1 3/3/1 4/4/1\n"
+    );
     std::fs::write(folder.path().join("m.mtl"), format!("newmtl m\n{}\n", mtl.replace("; ", "\n"))).unwrap();
     std::fs::write(folder.path().join("a.obj"), obj).unwrap();
     load(&folder.path().join("a.obj"), &LoadOptions::default(), &Silent).unwrap()

@@ -1,11 +1,12 @@
 //! Images made into what a material reads: opaque colours, numbers, normals from heights, two images in one.
 
-use glam::{DVec2, Vec4};
+use glam::DVec2;
 use rayon::prelude::*;
 
-use crate::scene::Texture;
 use crate::scene::detail::Channel;
-use crate::scene::texture::{Texels, linear_to_srgb, srgb_to_linear};
+use crate::scene::quantize::byte;
+use crate::scene::texture::{Texels, srgb_to_linear};
+use crate::scene::{Texture, Transfer};
 
 /// The steepest slope, and the largest factor of slopes: the normal then lies in the surface, as far as f32 can tell.
 pub(super) const STEEPEST: f64 = 1e6;
@@ -43,18 +44,14 @@ pub(super) fn adjusted(image: Texture, [base, gain]: [f64; 2]) -> Texture {
     if [base, gain] == [0.0, 1.0] {
         return image;
     }
-    let byte = |value: f64| (value.clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
-    let bytes = |texels: &[[u8; 4]], decode: fn(f64) -> f64, encode: fn(f64) -> f64| {
-        let table: [u8; 256] = std::array::from_fn(|value| {
-            let value = base + gain * decode(value as f64 / 255.0);
-            byte(encode(value.clamp(0.0, 1.0)))
-        });
+    let bytes = |texels: &[[u8; 4]], decode: fn(f64) -> f64, transfer: Transfer| {
+        let table: [u8; 256] =
+            std::array::from_fn(|value| byte((base + gain * decode(value as f64 / 255.0)) as f32, transfer));
         texels.iter().map(|&[r, g, b, a]| [table[r as usize], table[g as usize], table[b as usize], a]).collect()
     };
-    let same = |value| value;
     let texels = match &image.texels {
-        Texels::Srgb8(texels) => Texels::Srgb8(bytes(texels, srgb_to_linear, linear_to_srgb)),
-        Texels::Data8(texels) => Texels::Data8(bytes(texels, same, same)),
+        Texels::Srgb8(texels) => Texels::Srgb8(bytes(texels, srgb_to_linear, Transfer::Srgb)),
+        Texels::Data8(texels) => Texels::Data8(bytes(texels, |value| value, Transfer::Linear)),
         Texels::Linear32(texels) => {
             let value = |value: f32| ((base + gain * f64::from(value)) as f32).clamp(f32::MIN, f32::MAX);
             Texels::Linear32(texels.iter().map(|texel| texel.map(value)).collect())
@@ -74,12 +71,11 @@ pub(super) fn shows_normals(image: &Texture) -> bool {
     is_half(red) && is_half(green) && blue > 0.7
 }
 
-/// Normals of a surface whose height over its texels, in texels, is `scale` times a value of the image: of its slopes between
+/// Normals of a surface, from an image of numbers: its height over its texels, in texels, is `scale` times a value of it: normals of its slopes between
 /// the neighbours on both sides. In floats, since the slope of a step of one in 255 is lost in bytes.
 pub(super) fn normals_of_heights(image: &Texture, channel: Channel, scale: f64, clamp: bool) -> Texture {
     let (width, height) = (image.width as usize, image.height as usize);
-    let values = data(image);
-    let value = |x: usize, y: usize| f64::from(channel.of(texel(&values, x, y)));
+    let value = |x: usize, y: usize| f64::from(channel.of(image.texels.get(y * width + x)));
     let neighbours = |at: usize, count: usize| match (at, clamp) {
         (0, true) => (0, 1.min(count - 1)),
         (at, true) => (at - 1, (at + 1).min(count - 1)),
@@ -97,49 +93,40 @@ pub(super) fn normals_of_heights(image: &Texture, channel: Channel, scale: f64, 
     Texture { texels: Texels::Linear32(rows.collect::<Vec<_>>().into()), ..image.clone() }
 }
 
-/// One image with a value of each of two: roughness in green and metalness in blue, where glTF has them. The smaller is
+/// One image with a value of each of two images of numbers: roughness in green and metalness in blue, where glTF has them. The smaller is
 /// enlarged; what is not there is 1.
 pub(super) fn packed(
     roughness: Option<(&Texture, Channel)>,
     metalness: Option<(&Texture, Channel)>,
 ) -> Option<Texture> {
     let first = roughness.or(metalness)?.0;
-    let images = [roughness, metalness].map(|image| image.map(|(image, channel)| (data(image), channel)));
+    let images = [roughness, metalness];
     let size = |side: fn(&Texture) -> u32| images.iter().flatten().map(|(image, _)| side(image)).max().unwrap_or(1);
     let (width, height) = (size(|image| image.width), size(|image| image.height));
-    let byte = |value: f32| (value.clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
-    let value = |image: &Option<(Texture, Channel)>, x: u32, y: u32| {
+    let number = |value: f32| byte(value, Transfer::Linear);
+    let value = |image: Option<(&Texture, Channel)>, x: u32, y: u32| {
         let Some((image, channel)) = image else { return u8::MAX };
         if (image.width, image.height) == (width, height) {
-            return byte(channel.of(texel(image, x as usize, y as usize)));
+            return number(channel.of(image.texels.get(y as usize * width as usize + x as usize)));
         }
         let middle = |at: u32, side: u32| (f64::from(at) + 0.5) / f64::from(side);
         let place = DVec2::new(middle(x, width), 1.0 - middle(y, height));
-        byte(channel.of(image.sample_footprint(place, 0.0)))
+        number(channel.of(image.sample_footprint(place, 0.0)))
     };
-    let pixel = |x, y| [u8::MAX, value(&images[0], x, y), value(&images[1], x, y), u8::MAX];
+    let pixel = |x, y| [u8::MAX, value(images[0], x, y), value(images[1], x, y), u8::MAX];
     let rows = (0..height).into_par_iter().flat_map_iter(|y| (0..width).map(move |x| pixel(x, y)));
     let texels = Texels::Data8(rows.collect::<Vec<_>>().into());
     Some(Texture::new(first.name.clone(), width, height, texels))
 }
 
-/// A texel of an image of numbers, from the top left.
-fn texel(image: &Texture, x: usize, y: usize) -> Vec4 {
-    let at = y * image.width as usize + x;
-    match &image.texels {
-        Texels::Srgb8(texels) | Texels::Data8(texels) => {
-            Vec4::from_array(texels[at].map(|byte| (f64::from(byte) / 255.0) as f32))
-        }
-        Texels::Linear32(texels) => {
-            let [r, g, b] = texels[at];
-            Vec4::new(r, g, b, 1.0)
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::Vec4;
+
+    fn texel(image: &Texture, x: usize, y: usize) -> Vec4 {
+        image.texels.get(y * image.width as usize + x)
+    }
 
     fn image(width: u32, height: u32, texel: impl Fn(u32, u32) -> [u8; 4]) -> Texture {
         let texels: Vec<_> =
@@ -181,6 +168,7 @@ mod tests {
             let height = (51.0 * f64::from(x) + 25.5 * f64::from(4 - y)) as u8;
             [height, height, height, 255]
         });
+        let ramp = data(&ramp);
         let normals = normals_of_heights(&ramp, Channel::Red, 2.0, true);
         let found = texel(&normals, 1, 2).truncate() * 2.0 - 1.0;
         let expected = glam::Vec3::new(-0.4, -0.2, 1.0).normalize();
@@ -188,14 +176,14 @@ mod tests {
         // A border halves the difference where the image ends, and wraps around where it repeats.
         let at_border = |clamp| (texel(&normals_of_heights(&ramp, Channel::Red, 2.0, clamp), 0, 2) * 2.0 - 1.0).x;
         assert!(at_border(true) < 0.0 && at_border(false) > 0.0);
-        let flat = normals_of_heights(&image(3, 3, |_, _| [9, 9, 9, 255]), Channel::Luminance, 5.0, false);
+        let flat = normals_of_heights(&data(&image(3, 3, |_, _| [9, 9, 9, 255])), Channel::Luminance, 5.0, false);
         assert_eq!(texel(&flat, 1, 1), Vec4::new(0.5, 0.5, 1.0, 1.0));
     }
 
     #[test]
     fn two_images_become_one() {
-        let rough = image(2, 1, |x, _| [10 + x as u8, 0, 0, 255]);
-        let metal = image(1, 1, |_, _| [0, 0, 0, 77]);
+        let rough = data(&image(2, 1, |x, _| [10 + x as u8, 0, 0, 255]));
+        let metal = data(&image(1, 1, |_, _| [0, 0, 0, 77]));
         let both = packed(Some((&rough, Channel::Red)), Some((&metal, Channel::Alpha))).unwrap();
         assert_eq!((both.width, both.height), (2, 1));
         assert_eq!(both.texels, Texels::Data8(vec![[255, 10, 77, 255], [255, 11, 77, 255]].into()));

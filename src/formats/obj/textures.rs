@@ -46,9 +46,9 @@ enum Recipe {
     /// Numbers, as they are stored.
     Data(Source),
     /// Normals of heights: of which channel, by what the slopes are multiplied, and whether the image ends at its border.
-    Heights(Source, u8, u64, bool),
+    Heights(Source, Channel, u64, bool),
     /// Roughness and metalness, of which channels.
-    Packed(Option<(Source, u8)>, Option<(Source, u8)>),
+    Packed(Option<(Source, Channel)>, Option<(Source, Channel)>),
 }
 
 /// An image and the bits of what `-mm` says.
@@ -103,7 +103,7 @@ impl Textures {
     pub fn normals_of_heights(&mut self, map: &Map<'_>) -> TextureRef {
         let MapStatement { channel, bump, clamp, .. } = map.statement;
         let channel = channel.unwrap_or(Channel::Luminance);
-        self.refer(Recipe::Heights(source(map), channel as u8, bump.to_bits(), clamp), &map.statement)
+        self.refer(Recipe::Heights(source(map), channel, bump.to_bits(), clamp), &map.statement)
     }
 
     /// One texture with roughness and metalness, placed as the first that there is.
@@ -118,7 +118,7 @@ impl Textures {
         {
             return Some(self.data(first));
         }
-        let part = |map: &Map<'_>| (source(map), map.statement.channel.unwrap_or(Channel::Luminance) as u8);
+        let part = |map: &Map<'_>| (source(map), map.statement.channel.unwrap_or(Channel::Luminance));
         Some(self.refer(Recipe::Packed(roughness.map(part), metalness.map(part)), &first.statement))
     }
 
@@ -166,12 +166,12 @@ impl Textures {
             Recipe::Data(source) => adjust(texels::data(image(source)), source),
             Recipe::Heights(source, channel, scale, clamp) => {
                 let heights = adjust(texels::data(image(source)), source);
-                texels::normals_of_heights(&heights, channel_of(*channel), f64::from_bits(*scale), *clamp)
+                texels::normals_of_heights(&heights, *channel, f64::from_bits(*scale), *clamp)
             }
             Recipe::Packed(roughness, metalness) => {
-                let part = |part: &Option<(Source, u8)>| {
+                let part = |part: &Option<(Source, Channel)>| {
                     let (source, channel) = part.as_ref()?;
-                    Some((adjust(texels::data(image(source)), source), channel_of(*channel)))
+                    Some((adjust(texels::data(image(source)), source), *channel))
                 };
                 let (roughness, metalness) = (part(roughness), part(metalness));
                 texels::packed(lend(&roughness), lend(&metalness)).expect("one of the two is there")
@@ -187,11 +187,6 @@ fn source(map: &Map<'_>) -> Source {
 
 fn lend(part: &Option<(Texture, Channel)>) -> Option<(&Texture, Channel)> {
     part.as_ref().map(|(image, channel)| (image, *channel))
-}
-
-/// The channel with this discriminant.
-fn channel_of(number: u8) -> Channel {
-    [Channel::Red, Channel::Green, Channel::Blue, Channel::Alpha, Channel::Luminance][usize::from(number)]
 }
 
 #[cfg(test)]

@@ -4,7 +4,6 @@
 //! function; EXR and HDR hold linear floats. The film's exposure applies to all. The bytes depend on the film alone.
 
 mod layers;
-mod quantize;
 mod radiance;
 pub mod stored;
 
@@ -24,6 +23,7 @@ use crate::error::{Error, Fault, Result};
 use crate::formats::atomic_file::{Sink, write_atomically};
 use crate::render::Film;
 use crate::scene::Transfer;
+use crate::scene::quantize::byte;
 
 /// At this quality the loss is hard to see, and files are a third of those at 100.
 const JPEG_QUALITY: u8 = 95;
@@ -147,7 +147,7 @@ fn encode_bytes(film: &Film, format: PictureFormat, exposure: f32, encoder: impl
 
 fn rgb_bytes(film: &Film, exposure: f32) -> Vec<u8> {
     let transfer = film.settings.transfer;
-    let pixel = |color: &[f32; 3]| color.map(|value| quantize::byte(value * exposure, transfer));
+    let pixel = |color: &[f32; 3]| color.map(|value| byte(value * exposure, transfer));
     film.color.par_iter().map(pixel).collect::<Vec<_>>().into_flattened()
 }
 
@@ -156,8 +156,8 @@ fn rgba_bytes(film: &Film, alpha: &[f32], exposure: f32) -> Vec<u8> {
     let transfer = film.settings.transfer;
     let pixel = |(color, &alpha): (&[f32; 3], &f32)| {
         let weight = if alpha > 0.0 { exposure / alpha } else { 0.0 };
-        let [r, g, b] = color.map(|value| quantize::byte(value * weight, transfer));
-        [r, g, b, quantize::byte(alpha, Transfer::Linear)]
+        let [r, g, b] = color.map(|value| byte(value * weight, transfer));
+        [r, g, b, byte(alpha, Transfer::Linear)]
     };
     film.color.par_iter().zip(alpha).map(pixel).collect::<Vec<_>>().into_flattened()
 }

@@ -5,7 +5,7 @@ use glam::DVec2;
 use crate::error::Result;
 use crate::formats::scene_file::read::Reader;
 use crate::formats::scene_file::value::{Fields, Value};
-use crate::scene::detail::Rule;
+use crate::scene::detail::{Detail, Rule};
 use crate::scene::texture::{Filter, Wrap};
 use crate::scene::{Material, Rgb, TextureRef};
 
@@ -57,10 +57,13 @@ pub fn read_override(fields: &Fields<'_>, imported: &Material, reader: &mut Read
             detail.rule = Rule::Phong { highlight: None };
             material = material.with_phong_of(&surface);
         }
+        if matches!(detail.rule, Rule::Unlit { .. }) && fields.has("emission") {
+            detail.rule = Rule::Phong { highlight: None };
+        }
         if fields.has("kt") || fields.has("opacity") {
             detail.alpha = None;
         }
-        material.detail = Some(detail);
+        material.detail = (*detail != Detail::NONE).then_some(detail);
     }
     change(&mut material, fields, reader)?;
     Ok(material)
@@ -137,10 +140,6 @@ fn read_texture(value: &Value<'_>, reader: &mut Reader<'_>) -> Result<Option<Tex
     })?;
     let filters = [("linear", Filter::Linear), ("nearest", Filter::Nearest)];
     texture.filter = fields.or("filter", texture.filter, |value| value.choice(&filters))?;
-    if texture.filter == Filter::Nearest {
-        // Who wants single texels wants them at any distance.
-        texture.levels = [].into();
-    }
     let scale = fields.or("scale", DVec2::ONE, Value::pair)?;
     let offset = fields.or("offset", DVec2::ZERO, Value::pair)?;
     Ok(Some(TextureRef::scaled(reader.add_texture(texture), scale, offset)))

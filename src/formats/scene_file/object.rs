@@ -60,7 +60,19 @@ pub fn read_object(fields: &Fields<'_>, number: usize, reader: &mut Reader<'_>) 
 const QUADRIC_FIELDS: [&str; 4] = ["name", "material", "transform", "instances"];
 
 /// What objects have beside `mesh`.
-const MESH_FIELDS: [&str; 6] = ["name", "material", "transform", "instances", "normals", "up"];
+const MESH_FIELDS: [&str; 11] = [
+    "name",
+    "material",
+    "transform",
+    "instances",
+    "normals",
+    "up",
+    "crease_angle",
+    "scene",
+    "time",
+    "animation",
+    "cull_back_faces",
+];
 
 /// The transform of every instance, first `transform`, then that of the instance, and the value that gave it: `shape`
 /// where none did.
@@ -78,9 +90,22 @@ fn read_places<'a>(fields: &Fields<'a>, shape: &Value<'a>) -> Result<Vec<(DAffin
 fn read_load_options(fields: &Fields<'_>, default: &LoadOptions) -> Result<LoadOptions> {
     let modes = [("file", NormalMode::File), ("flat", NormalMode::Flat), ("smooth", NormalMode::Smooth)];
     let axes = [("y", UpAxis::Y), ("z", UpAxis::Z)];
+    let optional = |key, default: &Option<f64>, read: fn(&Value<'_>) -> Result<f64>| {
+        fields.or(key, *default, |value: &Value<'_>| read(value).map(Some))
+    };
+    let optional_name = |key, default: &Option<String>| {
+        fields.or(key, default.clone(), |value: &Value<'_>| value.name().map(|name| Some(name.to_owned())))
+    };
     Ok(LoadOptions {
         normals: fields.or("normals", default.normals, |value: &Value<'_>| value.choice(&modes))?,
         up: fields.or("up", default.up, |value| value.choice(&axes))?,
+        crease_angle: optional("crease_angle", &default.crease_angle, |value| {
+            Ok(value.between(0.0..=180.0)?.to_radians())
+        })?,
+        scene: optional_name("scene", &default.scene)?,
+        time: optional("time", &default.time, |value| value.number())?,
+        animation: optional_name("animation", &default.animation)?,
+        cull_back_faces: fields.or("cull_back_faces", default.cull_back_faces, Value::boolean)?,
         ..default.clone()
     })
 }

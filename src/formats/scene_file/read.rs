@@ -16,6 +16,7 @@ use crate::geometry::Quadric;
 use crate::progress::Progress;
 use crate::scene::auto::{self, Automatic};
 use crate::scene::extent::{Extents, Misfit};
+use crate::scene::texture::Filter;
 use crate::scene::{NamedCamera, Object, Scene, Texture, exposure};
 
 /// Larger files are no scene files: meshes are files of their own.
@@ -216,7 +217,7 @@ impl Reader<'_> {
             return Ok(texture.clone());
         }
         self.ledger.note_file(&path);
-        let texture = read_texture(&path, &self.options.limits)?.with_levels();
+        let texture = read_texture(&path, &self.options.limits)?;
         self.images.insert(key, texture.clone());
         Ok(texture)
     }
@@ -230,7 +231,9 @@ impl Reader<'_> {
             other.texels.is_shared_with(&texture.texels) && (other.wrap, other.filter) == (texture.wrap, texture.filter)
         };
         let number = self.scene.textures.iter().position(same).unwrap_or_else(|| {
-            self.scene.textures.push(texture);
+            // Who wants single texels wants them at any distance.
+            let has_levels = texture.filter == Filter::Linear;
+            self.scene.textures.push(if has_levels { texture.with_levels() } else { texture });
             self.scene.textures.len() - 1
         });
         number as u32
@@ -255,10 +258,8 @@ impl Reader<'_> {
             Fault::Unsupported if error.line().is_none() => value.error(error.to_string()),
             _ => error,
         })?;
-        let mut ledger = model.ledger.clone();
-        ledger.shift(self.scene.materials.len() as u32, self.scene.meshes.len() as u32);
+        let (contents, ledger) = model.append_assets(&mut self.scene);
         self.ledger.merge(ledger);
-        let contents = model.append_assets(&mut self.scene);
         let vertices = self.scene.meshes.iter().map(|mesh| mesh.positions.len() as u64).sum();
         options.limits.check_vertices(vertices).map_err(|error| error.at_path(&path))?;
         self.extents.add_new(&self.scene);

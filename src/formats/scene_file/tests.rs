@@ -497,6 +497,47 @@ fn a_saved_scene_reads_back_to_the_bit() {
 }
 
 #[test]
+fn a_saved_scene_reads_its_model_as_it_was_read() {
+    let folder = folder_with("");
+    let model = folder.path().join("m.gltf");
+    let data = "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA";
+    let text = serde_json::json!({
+        "asset": {"version": "2.0"},
+        "scenes": [{"nodes": [0]}, {"nodes": [1], "name": "the \"other\""}],
+        "nodes": [{"mesh": 0, "name": "a"}, {"mesh": 0, "name": "b"}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "material": 0}]}],
+        "materials": [{"name": "one side"}],
+        "buffers": [{"byteLength": 36, "uri": data}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]}],
+    });
+    std::fs::write(&model, text.to_string()).unwrap();
+    let options = LoadOptions {
+        scene: Some("the \"other\"".into()),
+        cull_back_faces: true,
+        time: Some(0.1 + 0.2),
+        animation: Some("0".into()),
+        crease_angle: Some(0.7),
+        ..LoadOptions::default()
+    };
+    // Without the animation, which this file does not have.
+    let scene =
+        formats::open(&model, &LoadOptions { time: None, animation: None, ..options.clone() }, &Silent).unwrap().scene;
+    let to = folder.path().join("saved.toml");
+    save_model_scene(&scene, &model, &LoadOptions { time: None, animation: None, ..options.clone() }, &to).unwrap();
+    let read = opened(&folder, "saved.toml").unwrap().scene;
+    assert_eq!((read.objects[0].name.as_str(), read.materials.last().unwrap().single_sided), ("b", true));
+    save_model_scene(&scene, &model, &options, &to).unwrap();
+    let saved = std::fs::read_to_string(&to).unwrap();
+    let value = |key: &str| {
+        let line = saved.lines().find_map(|line| line.strip_prefix(key)?.strip_prefix(" = ")).unwrap();
+        line.to_owned()
+    };
+    assert_eq!((value("time"), value("animation")), ("0.30000000000000004".into(), "\"0\"".into()));
+    assert_eq!(value("crease_angle").parse::<f64>().unwrap().to_radians(), 0.7);
+}
+
+#[test]
 fn films_at_the_limits_are_saved_and_read_back() {
     let folder = folder_with("");
     let (model, to) = (folder.path().join("m.obj"), folder.path().join("saved.toml"));

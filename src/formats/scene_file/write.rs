@@ -16,7 +16,7 @@ use crate::scene::{
 ///
 /// Film, ambient, background, cameras (the active one first) and lights are written as they are in `scene`; the meshes
 /// and materials stay in the model, which the file names relative to itself. Read back, the scene renders to the same
-/// bytes.
+/// bytes, given the same limits and permission to read files elsewhere: these a file does not grant itself.
 ///
 /// # Errors
 /// A caller's error for another suffix than `.toml`, for a `model` that is a scene file itself, and for paths that are
@@ -68,6 +68,21 @@ fn model_scene(scene: &Scene, model: &Path, options: &LoadOptions, to: &Path) ->
     match options.up {
         UpAxis::Y => {}
         UpAxis::Z => out.key("up", quoted("z")),
+    }
+    if let Some(radians) = options.crease_angle {
+        out.key("crease_angle", number(degrees(radians)));
+    }
+    if let Some(name) = &options.scene {
+        out.key("scene", quoted(name));
+    }
+    if let Some(seconds) = options.time {
+        out.key("time", number(seconds));
+    }
+    if let Some(name) = &options.animation {
+        out.key("animation", quoted(name));
+    }
+    if options.cull_back_faces {
+        out.key("cull_back_faces", true);
     }
     let mut names = Names::default();
     let others = scene.cameras.iter().enumerate().filter(|(index, _)| *index != scene.active_camera);

@@ -17,11 +17,11 @@ struct Edges {
 }
 
 /// Finds how triangles meet.
-pub(super) fn examine(mesh: &TriangleMesh, referenced: &[bool], findings: &mut Findings) {
-    let weld = Weld::new(mesh, referenced);
+pub(super) fn examine(mesh: &TriangleMesh, findings: &mut Findings) {
+    let weld = Weld::new(mesh);
     let mut edges = Edges::collect(mesh, &weld);
     let mut is_duplicate = vec![false; mesh.indices.len()];
-    for point in 0..weld.count {
+    for point in 0..weld.end() {
         let range = edges.starts[point]..edges.starts[point + 1];
         let own = &mut edges.entries[range];
         own.sort_unstable();
@@ -37,12 +37,12 @@ pub(super) fn examine(mesh: &TriangleMesh, referenced: &[bool], findings: &mut F
 
 impl Edges {
     fn collect(mesh: &TriangleMesh, weld: &Weld) -> Self {
-        let mut starts = vec![0; weld.count + 1];
+        let mut starts = vec![0; weld.end() + 1];
         for_each_edge(mesh, weld, |low, _, _| starts[low as usize + 1] += 1);
-        for point in 0..weld.count {
+        for point in 0..weld.end() {
             starts[point + 1] += starts[point];
         }
-        let mut entries = vec![0; starts[weld.count]];
+        let mut entries = vec![0; starts[weld.end()]];
         let mut next = starts.clone();
         for_each_edge(mesh, weld, |low, high, triangle| {
             let place = &mut next[low as usize];

@@ -10,10 +10,8 @@ mod weld;
 
 use std::collections::BTreeMap;
 
-use glam::Vec3;
-
 use crate::geometry::TriangleMesh;
-use crate::geometry::mesh::FARTHEST_COORDINATE;
+use crate::geometry::mesh::is_usable;
 
 /// How many places of each flaw are kept: those with the lowest numbers.
 pub const MOST_PLACES: usize = 5;
@@ -117,7 +115,7 @@ pub fn examine(mesh: &TriangleMesh, outside_image: &dyn Fn(u32, u32) -> bool) ->
     let mut findings = Findings::default();
     dropped(mesh, &mut findings);
     let referenced = referenced(mesh, &mut findings);
-    edges::examine(mesh, &referenced, &mut findings);
+    edges::examine(mesh, &mut findings);
     corners::examine(mesh, &referenced, outside_image, &mut findings);
     findings
 }
@@ -149,11 +147,6 @@ fn referenced(mesh: &TriangleMesh, findings: &mut Findings) -> Vec<bool> {
         findings.note(Flaw::UnreferencedVertex, None, Some(vertex));
     }
     referenced
-}
-
-/// Whether a triangle with this corner can be hit; NaN is not usable.
-fn is_usable(corner: Vec3) -> bool {
-    corner.abs().cmple(Vec3::splat(FARTHEST_COORDINATE)).all()
 }
 
 #[cfg(test)]

@@ -1,5 +1,7 @@
 //! Tiny meshes, each with one flaw, and a closed cube with none.
 
+use glam::Vec3;
+
 use super::*;
 
 /// The cube [0, 1]^3, closed, faces outward: vertex number x + 2 y + 4 z.

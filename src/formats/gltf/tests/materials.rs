@@ -22,7 +22,7 @@ fn textures_are_decoded_once_and_read_as_their_samplers_say() {
             "nodes": [{"mesh": 0}],
             "meshes": [{"primitives": [{"attributes": {"POSITION": position, "TEXCOORD_1": uv}, "material": 0}]}],
             "images": [{"uri": RED_BLACK}, {"uri": "missing.png"}],
-            "samplers": [{"wrapS": 33071, "wrapT": 33648, "magFilter": 9728}],
+            "samplers": [{"wrapS": 33071, "wrapT": 33648, "magFilter": 9728, "minFilter": 9729}],
             "textures": [{"source": 0, "sampler": 0}, {"source": 0}, {"source": 1}],
             "materials": [
                 {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0, "extensions": transform}}},
@@ -35,6 +35,7 @@ fn textures_are_decoded_once_and_read_as_their_samplers_say() {
     let [first, second] = model.textures.as_slice() else { panic!("{} textures", model.textures.len()) };
     assert_eq!((first.wrap, first.filter), ([Wrap::Clamp, Wrap::Mirror], Filter::Nearest));
     assert_eq!((second.wrap, second.filter), ([Wrap::Repeat, Wrap::Repeat], Filter::Linear));
+    assert_eq!((first.levels.len(), second.levels.len()), (0, 1), "minFilter LINEAR has no mipmaps");
     let used = |material: usize| model.materials[material].diffuse_texture.map(|used| used.texture);
     assert_eq!([used(0), used(1), used(2), used(3)], [Some(0), Some(1), Some(0), None]);
     assert!(has_note(&model, Treatment::Warning, "images[1]"));
@@ -147,4 +148,84 @@ fn a_blend_takes_the_alpha_of_each_texel() {
     assert_eq!(model.materials[0].at(Vec4::ONE, with(0.5)).kt, Rgb::splat(0.75));
     assert_eq!(model.materials[0].alpha_at(Vec4::ONE, with(0.0)), 0.0);
     assert!(has_note(&model, Treatment::Honoured, "BLEND"));
+}
+
+#[test]
+fn texture_transforms_turn_scale_and_move() {
+    let mut file = File::default();
+    let position = file.triangle();
+    let mut rest = one(json!({"attributes": {"POSITION": position}, "material": 0}));
+    rest["images"] = json!([{"uri": RED_BLACK}]);
+    rest["textures"] = json!([{"source": 0}]);
+    let turn = 0.4f64;
+    let transform = json!({"rotation": turn, "scale": [2, 3], "offset": [0.5, 0.25], "texCoord": 2});
+    let info = json!({"index": 0, "extensions": {"KHR_texture_transform": transform}});
+    rest["materials"] = json!([{"pbrMetallicRoughness": {"baseColorTexture": info}}]);
+    let model = file.load(rest).unwrap();
+    assert!(has_note(&model, Treatment::Approximated, "TEXCOORD_1"), "set 2 is not read");
+    let used = model.materials[0].diffuse_texture.unwrap();
+    assert!(used.second_uvs);
+    // The extension's own shader, in whose coordinates v goes down.
+    let (sin, cos) = (f64::from(turn as f32).sin(), f64::from(turn as f32).cos());
+    for (u, v) in [(0.0, 0.0), (1.0, 0.0), (0.25, 0.75)] {
+        let (su, sv) = (2.0 * u, 3.0 * v);
+        let theirs = DVec2::new(cos * su + sin * sv + 0.5, -sin * su + cos * sv + 0.25);
+        let ours = used.place(DVec2::new(u, 1.0 - v));
+        assert!((ours - DVec2::new(theirs.x, 1.0 - theirs.y)).abs().max_element() < 1e-12, "{ours} {theirs}");
+    }
+}
+
+#[test]
+fn a_volume_absorbs_by_beers_law() {
+    let solid = |thickness: f32, distance: Option<f32>| {
+        let mut volume = json!({"thicknessFactor": thickness, "attenuationColor": [0.5, 1, 0.25]});
+        if let Some(distance) = distance {
+            volume["attenuationDistance"] = json!(distance);
+        }
+        let transmission = json!({"transmissionFactor": 1});
+        let extensions = json!({"KHR_materials_transmission": transmission, "KHR_materials_volume": volume});
+        with_material(json!({ "extensions": extensions })).materials.remove(0)
+    };
+    let glass = solid(1.0, Some(2.0));
+    // After the distance the colour is left.
+    assert!((glass.left_after(2.0) - Rgb::new(0.5, 1.0, 0.25)).abs().max_element() < 1e-6);
+    assert!((glass.left_after(4.0) - Rgb::new(0.25, 1.0, 0.0625)).abs().max_element() < 1e-6);
+    assert!(!solid(0.0, Some(2.0)).is_absorbing(), "a thin wall has no inside");
+    assert!(!solid(1.0, None).is_absorbing(), "without a distance it is clear");
+}
+
+#[test]
+fn what_is_not_used_of_a_material_is_told() {
+    let mut file = File::default();
+    let position = file.triangle();
+    let mut rest = one(json!({"attributes": {"POSITION": position}, "material": 0}));
+    rest["images"] = json!([{"uri": RED_BLACK}]);
+    rest["textures"] = json!([{"source": 0}]);
+    rest["materials"] = json!([{"occlusionTexture": {"index": 0}}, {"doubleSided": true}]);
+    let json = file.json(rest);
+    let load = |cull_back_faces| load_json(&json, &LoadOptions { cull_back_faces, ..LoadOptions::default() }).unwrap();
+    let (both, front) = (load(false), load(true));
+    assert!(has_note(&both, Treatment::Ignored, "occlusionTexture") && both.textures.is_empty());
+    assert!(has_note(&both, Treatment::Honoured, "single-sided material"));
+    let sides = |model: &Model| model.materials.iter().map(|material| material.single_sided).collect::<Vec<_>>();
+    assert_eq!((sides(&both), sides(&front)), (vec![false, false], vec![true, false]));
+}
+
+#[test]
+fn webp_images_stand_in_for_others() {
+    let mut webp = Vec::new();
+    let green = image::RgbImage::from_pixel(3, 2, image::Rgb([0, 255, 0]));
+    green.write_to(&mut std::io::Cursor::new(&mut webp), image::ImageFormat::WebP).unwrap();
+    let mut file = File::default();
+    let position = file.triangle();
+    let view = file.view(&webp);
+    let mut rest = one(json!({"attributes": {"POSITION": position}, "material": 0}));
+    rest["extensionsUsed"] = json!(["EXT_texture_webp"]);
+    rest["extensionsRequired"] = json!(["EXT_texture_webp"]);
+    rest["images"] = json!([{"bufferView": view, "mimeType": "image/webp"}]);
+    rest["textures"] = json!([{"extensions": {"EXT_texture_webp": {"source": 0}}}]);
+    rest["materials"] = json!([{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]);
+    let model = file.load(rest).unwrap();
+    assert_eq!((model.textures[0].width, model.textures[0].height), (3, 2));
+    assert_eq!(model.textures[0].sample(DVec2::splat(0.5)), Rgb::Y);
 }

@@ -154,8 +154,10 @@ fn animations_are_chosen_by_name_or_number() {
     assert!(error.fault() == Fault::Caller && error.to_string().contains("0, 1 `walk`"), "{error}");
     assert_eq!(load(&rest, None, f64::NAN).unwrap_err().fault(), Fault::Caller);
     rest["animations"] = json!([]);
-    assert!(has_note(&load(&rest, Some("0"), 0.0).unwrap(), Treatment::Warning, "no animation"));
-    assert_eq!(load(&rest, Some("walk"), 0.0).unwrap_err().fault(), Fault::Caller);
+    assert!(has_note(&load(&rest, None, 0.0).unwrap(), Treatment::Warning, "no animation"));
+    for named in ["0", "walk"] {
+        assert_eq!(load(&rest, Some(named), 0.0).unwrap_err().fault(), Fault::Caller);
+    }
 }
 
 /// A triangle with two morph targets; the second is sparse, and in bytes.
