@@ -51,13 +51,6 @@ fn hills(side: u32, kind: Kind) -> String {
     text
 }
 
-/// A value of this process's status in bytes.
-fn status(name: &str) -> Option<u64> {
-    let text = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = text.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(':'))?;
-    Some(line.trim().strip_suffix(" kB")?.trim().parse::<u64>().ok()? * 1024)
-}
-
 /// Loads by whitted; the bytes of the mesh.
 fn by_whitted(path: &Path) -> usize {
     let model = load_model(path, &LoadOptions::default(), &Silent).unwrap();
@@ -75,6 +68,11 @@ fn median(mut seconds: Vec<f64>) -> f64 {
     seconds[seconds.len() / 2]
 }
 
+/// How often each is timed: once where `cargo bench -- --test` asks whether it runs at all.
+fn runs() -> usize {
+    if std::env::args().any(|argument| argument == "--test") { 1 } else { ROUNDS }
+}
+
 fn main() {
     let folder = tempfile::tempdir().unwrap();
     for (name, kind) in
@@ -86,26 +84,13 @@ fn main() {
         std::fs::write(&path, &text).unwrap();
         drop(text);
 
-        // Forget the peak so far.
-        let measured = std::fs::write("/proc/self/clear_refs", "5").ok().and_then(|()| status("VmRSS"));
-        let end = by_whitted(&path) as f64;
-        if let (Some(before), Some(peak)) = (measured, status("VmHWM")) {
-            let peak = peak.saturating_sub(before) as f64;
-            println!(
-                "{name}: {:.1} MB in the end, {:.1} MB at the peak, {:.2} times",
-                end / 1e6,
-                peak / 1e6,
-                peak / end
-            );
-        }
-
         let readers: [(&str, &dyn Fn() -> usize); 3] = [
             ("whitted", &|| by_whitted(&path)),
             ("tobj", &|| by_tobj(&path, false)),
             ("tobj, one index", &|| by_tobj(&path, true)),
         ];
         let mut seconds = [const { Vec::new() }; 3];
-        for _ in 0..ROUNDS {
+        for _ in 0..runs() {
             for ((_, read), seconds) in readers.iter().zip(&mut seconds) {
                 let start = Instant::now();
                 black_box(read());

@@ -10,11 +10,12 @@ use std::path::Path;
 
 use glam::Vec2;
 use serde_json::{Value, json};
-use whitted::accel::Params;
 use whitted::formats::{LoadOptions, open};
 use whitted::geometry::TriangleMesh;
 use whitted::progress::Silent;
-use whitted::render::{Film, RenderSettings, Renderer};
+use whitted::render::Film;
+
+use crate::common;
 
 /// A hundredth of a step of 8 bits in the bright half of sRGB.
 const TOLERANCE: f32 = 0.01 / 255.0;
@@ -88,11 +89,10 @@ fn write_gltf(folder: &Path, mesh: &TriangleMesh, material: &Value, images: &[&s
     fs::write(folder.join("a.bin"), bytes).unwrap();
 }
 
-fn render(path: &Path) -> Film {
+fn rendered(path: &Path) -> Film {
     let mut scene = open(path, &LoadOptions::default(), &Silent).unwrap().scene;
     (scene.film.width, scene.film.height, scene.film.samples) = (48, 48, 4);
-    let renderer = Renderer::build(scene, &Params::default(), &Silent).unwrap();
-    renderer.render(&RenderSettings::default(), &Silent).unwrap()
+    common::render(&scene)
 }
 
 fn check(mtl: &str, material: Value, images: &[&str]) {
@@ -109,7 +109,7 @@ fn check(mtl: &str, material: Value, images: &[&str]) {
     let mesh = patch();
     write_obj(folder.path(), &mesh, mtl);
     write_gltf(folder.path(), &mesh, &material, images);
-    let [obj, gltf] = ["a.obj", "a.gltf"].map(|name| render(&folder.path().join(name)));
+    let [obj, gltf] = ["a.obj", "a.gltf"].map(|name| rendered(&folder.path().join(name)));
     let difference = |(a, b): (&[f32; 3], &[f32; 3])| (0..3).map(|c| (a[c] - b[c]).abs()).fold(0.0, f32::max);
     let largest = obj.color.iter().zip(&gltf.color).map(difference).fold(0.0, f32::max);
     assert!(largest <= TOLERANCE, "{mtl}: {largest}");

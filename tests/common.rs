@@ -1,5 +1,7 @@
 //! Scenes that several tests share, built through the public API.
 
+use std::path::{Path, PathBuf};
+
 use glam::{DAffine3, DVec3, Vec3};
 use whitted::accel::{Kind, Params};
 use whitted::geometry::{Quadric, TriangleMesh};
@@ -117,4 +119,19 @@ pub fn render_with(scene: &Scene, kind: Kind, threads: usize) -> Film {
 /// The colour of the scene's one pixel.
 pub fn pixel(scene: &Scene) -> Rgb {
     Rgb::from_array(render(scene).color[0])
+}
+
+/// Fails where two colours are farther apart than `tolerance` in a channel.
+pub fn near(a: Rgb, b: Rgb, tolerance: f32) {
+    assert!((a - b).abs().max_element() <= tolerance, "{a} is not {b}");
+}
+
+/// A file or folder of models that others made, which are not part of the project; `None`, with a message, where it is absent.
+pub fn shared(name: &str) -> Option<PathBuf> {
+    let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data")).join(name);
+    if path.exists() {
+        return Some(path);
+    }
+    eprintln!("skipped: {} is absent", path.display());
+    None
 }

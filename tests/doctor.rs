@@ -1,21 +1,17 @@
 //! The mesh doctor on models whose flaws are known.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
 use whitted::formats::{LoadOptions, load_model};
 use whitted::geometry::doctor::{Flaw, examine};
 use whitted::progress::Silent;
 
+use crate::common::shared;
+
 /// The flaws of a model's only mesh by number, and the numbers of its vertices and triangles; `None` where the shared models are
 /// absent.
 fn flaws(model: &str) -> Option<(BTreeMap<Flaw, u64>, usize, usize)> {
-    let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data")).join(model);
-    if !path.exists() {
-        eprintln!("skipped: {} is absent", path.display());
-        return None;
-    }
-    let model = load_model(&path, &LoadOptions::default(), &Silent).unwrap();
+    let model = load_model(&shared(model)?, &LoadOptions::default(), &Silent).unwrap();
     let mesh = &model.meshes[0];
     let findings = examine(mesh, &|_, _| false);
     let counts = findings.iter().map(|(flaw, finding)| (flaw, finding.count)).collect();

@@ -16,6 +16,7 @@ use whitted::accel::Params;
 use whitted::formats::{LoadOptions, open, picture};
 use whitted::progress::Silent;
 use whitted::render::{RenderSettings, Renderer};
+use whitted::scene::Scene;
 
 /// The variable that, if set, has pictures written instead of compared.
 const REGENERATE: &str = "WHITTED_REGENERATE_GOLDEN";
@@ -61,7 +62,8 @@ fn folder() -> PathBuf {
 
 /// Renders a scene and compares it with its picture, or writes that.
 fn check(name: &str) {
-    compare(name, &render(&folder().join(name).with_extension("toml")));
+    let scene = folder().join(name).with_extension("toml");
+    compare(name, &png(open(&scene, &LoadOptions::default(), &Silent).unwrap().scene));
 }
 
 /// Compares a PNG with the golden one of this name, or writes that.
@@ -81,9 +83,8 @@ pub fn compare(name: &str, rendered: &[u8]) {
 }
 
 /// The bytes of the PNG that a scene gives.
-fn render(scene: &Path) -> Vec<u8> {
-    let loaded = open(scene, &LoadOptions::default(), &Silent).unwrap();
-    let renderer = Renderer::build(loaded.scene, &Params::default(), &Silent).unwrap();
+pub fn png(scene: Scene) -> Vec<u8> {
+    let renderer = Renderer::build(scene, &Params::default(), &Silent).unwrap();
     let film = renderer.render(&RenderSettings::default(), &Silent).unwrap();
     let mut bytes = Vec::new();
     picture::write_png(&film, &mut bytes).unwrap();

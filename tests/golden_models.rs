@@ -1,33 +1,22 @@
 //! Golden images of models that others made to show whether a reader of glTF is right. The models are not part of the project;
 //! where they are absent the tests are skipped. What each must show was seen with the eye before its picture was kept.
 
-use std::path::Path;
-
-use whitted::accel::Params;
-use whitted::formats::{LoadOptions, open, picture};
+use whitted::formats::{LoadOptions, open};
 use whitted::progress::Silent;
-use whitted::render::{RenderSettings, Renderer};
 use whitted::scene::auto::{self, View};
 
-use crate::golden::compare;
+use crate::common::shared;
+use crate::golden::{compare, png};
 
 /// Renders a model from a side and compares the picture with the one that is kept.
 fn check(name: &str, file: &str, view: View) {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/gltf").join(file);
-    if !path.exists() {
-        eprintln!("skipped: {} is absent", path.display());
-        return;
-    }
+    let Some(path) = shared(&format!("gltf/{file}")) else { return };
     let options = LoadOptions { cull_back_faces: true, ..LoadOptions::default() };
     let mut scene = open(&path, &options, &Silent).unwrap().scene;
     (scene.film.width, scene.film.height, scene.film.samples) = (200, 150, 9);
     let (azimuth, elevation) = view.angles();
     scene.cameras[scene.active_camera].camera = auto::frame(&scene, azimuth, elevation, 0.6);
-    let renderer = Renderer::build(scene, &Params::default(), &Silent).unwrap();
-    let film = renderer.render(&RenderSettings::default(), &Silent).unwrap();
-    let mut bytes = Vec::new();
-    picture::write_png(&film, &mut bytes).unwrap();
-    compare(&format!("models/{name}"), &bytes);
+    compare(&format!("models/{name}"), &png(scene));
 }
 
 /// Arrows on the faces of a cube lie beside arrows on the ground that the file's matrices, rotations and scales have

@@ -66,22 +66,28 @@ const SIDE: &str = "WHITTED_TEST_SIDE";
 const KIND: &str = "WHITTED_TEST_KIND";
 const PREFIX: &str = "peak and end: ";
 
-/// The peak is the tree, 32 bytes for boxes and numbers while it is built, and a chunk a thread, for which there is a margin.
-fn check<A: TriangleAccelerator>(side: u32, limit: f64) {
+/// What a test prints in a process of its own: the peak and the end. `None`, with a message, where the system does not tell.
+fn ask(test: &str, variables: &[(&str, String)]) -> Option<[f64; 2]> {
     let output = std::process::Command::new(std::env::current_exe().unwrap())
-        .args(["memory::alone", "--exact", "--ignored", "--nocapture"])
-        .env(SIDE, side.to_string())
-        .env(KIND, A::NAME)
+        .args([test, "--exact", "--ignored", "--nocapture"])
+        .envs(variables.iter().map(|(name, value)| (name, value)))
         .env("RAYON_NUM_THREADS", "2")
         .output()
         .unwrap();
     let text = String::from_utf8_lossy(&output.stdout);
     let line = text.lines().find_map(|line| Some(line.split_once(PREFIX)?.1)).unwrap_or_else(|| panic!("{text}"));
     let numbers: Vec<f64> = line.split_whitespace().map(|number| number.parse().unwrap()).collect();
-    let [peak, end] = numbers[..] else {
+    let measured = numbers.try_into().ok();
+    if measured.is_none() {
         eprintln!("skipped: this system does not tell how much memory a process takes");
-        return;
-    };
+    }
+    measured
+}
+
+/// The peak is the tree, 32 bytes for boxes and numbers while it is built, and a chunk a thread, for which there is a margin.
+fn check<A: TriangleAccelerator>(side: u32, limit: f64) {
+    let variables = [(SIDE, side.to_string()), (KIND, A::NAME.to_owned())];
+    let Some([peak, end]) = ask("memory::alone", &variables) else { return };
     println!("{}, {} triangles: {end:.1} bytes each in the end, {peak:.1} at the peak", A::NAME, 2 * side * side);
     let margin = 48.0 * f64::from(1 << 20) / f64::from(2 * side * side);
     assert!(end < limit, "{end} bytes a triangle");
@@ -260,19 +266,8 @@ fn check_load(side: u32, suffix: &str, kind: &str) {
     } else {
         write_hills(&path, side, kind)
     }
-    let output = std::process::Command::new(std::env::current_exe().unwrap())
-        .args(["memory::load_alone", "--exact", "--ignored", "--nocapture"])
-        .env(FILE, &path)
-        .env("RAYON_NUM_THREADS", "2")
-        .output()
-        .unwrap();
-    let text = String::from_utf8_lossy(&output.stdout);
-    let line = text.lines().find_map(|line| Some(line.split_once(PREFIX)?.1)).unwrap_or_else(|| panic!("{text}"));
-    let numbers: Vec<f64> = line.split_whitespace().map(|number| number.parse().unwrap()).collect();
-    let [peak, end] = numbers[..] else {
-        eprintln!("skipped: this system does not tell how much memory a process takes");
-        return;
-    };
+    let variables = [(FILE, path.to_str().unwrap().to_owned())];
+    let Some([peak, end]) = ask("memory::load_alone", &variables) else { return };
     let triangles = f64::from(2 * side * side);
     println!(
         "{suffix}, {kind}, {triangles} triangles: {:.1} bytes each in the end, {:.1} at the peak",

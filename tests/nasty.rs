@@ -10,21 +10,12 @@ use std::time::{Duration, Instant};
 use serde_json::json;
 
 use crate::command_line::Workshop;
+use crate::common::shared;
 
 /// What any of the files may take.
 const MOST_TIME: Duration = Duration::from_secs(10);
 /// Address space in KiB, which bounds resident memory from above: 1 GiB.
 const MOST_KIB: usize = 1 << 20;
-
-/// A folder of the shared models, if present.
-fn shared(folder: &str) -> Option<PathBuf> {
-    let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data")).join(folder);
-    if path.exists() {
-        return Some(path);
-    }
-    eprintln!("skipped: {} is absent", path.display());
-    None
-}
 
 /// All models below a folder.
 fn models_below(folder: &Path, found: &mut Vec<PathBuf>) {

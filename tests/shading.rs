@@ -7,10 +7,6 @@ use whitted::scene::{Camera, Clamp, FilmSettings, Light, LightKind, Material, Na
 
 use crate::common::*;
 
-fn near(a: Rgb, b: Rgb, tolerance: f32) {
-    assert!((a - b).abs().max_element() <= tolerance, "{a} is not {b}");
-}
-
 fn placed(center: DVec3, radius: f64) -> DAffine3 {
     DAffine3::from_translation(center) * DAffine3::from_scale(DVec3::splat(radius))
 }
