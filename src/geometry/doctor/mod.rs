@@ -22,7 +22,7 @@ pub const MOST_PLACES: usize = 5;
 pub enum Flaw {
     /// A triangle with a vertex number that is not in the file.
     BadIndex,
-    /// A triangle with a vertex that is not finite or beyond [`FARTHEST_COORDINATE`].
+    /// A triangle with a vertex that is not finite or beyond [`FARTHEST_COORDINATE`](crate::geometry::mesh::FARTHEST_COORDINATE).
     NonFinite,
     /// A triangle without area.
     Degenerate,
