@@ -62,6 +62,8 @@
 pub mod accel;
 #[cfg(feature = "cli")]
 pub mod cli;
+#[cfg(feature = "editor")]
+pub mod editor;
 pub mod error;
 pub mod formats;
 pub mod geometry;
