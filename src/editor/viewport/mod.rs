@@ -2,5 +2,10 @@
 //! mirrors and refraction.
 
 pub mod camera;
+pub mod decimate;
+pub mod piece;
+pub mod preview;
+pub mod terms;
+pub mod tessellate;
 
 pub use camera::View;
