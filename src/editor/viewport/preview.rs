@@ -258,6 +258,13 @@ impl Shown {
     }
 }
 
+impl Shown {
+    /// Whether [`stand_in`](Self::stand_in) gives all that it will ever give.
+    pub fn has_stand_in(&self, total: usize, most: usize) -> bool {
+        self.piece.triangle_count() < SMALL / 10 || total <= most || self.stand_in.get().is_some()
+    }
+}
+
 /// The triangles of a mesh that can be hit; flat where it has no normals and where the material is.
 pub fn piece_of_mesh(mesh: &TriangleMesh, is_flat: &(dyn Fn(u32) -> bool + Sync)) -> Piece {
     let live: Vec<u32> = mesh.live_triangles().collect();

@@ -59,8 +59,10 @@ pub fn tessellate(quadric: &Quadric, fineness: &Fineness) -> Tessellation {
     }
     let mut result = march.result;
     give_missing_normals(&mut result);
-    if !matches!(quadric.mapping(), Mapping::Planar { .. }) {
-        close_seams(&mut result);
+    match quadric.mapping() {
+        Mapping::Spherical => close_seams(&mut result, quadric.center()),
+        Mapping::Cylindrical { .. } => close_seams(&mut result, DVec3::ZERO),
+        Mapping::Planar { .. } => {}
     }
     result
 }
@@ -271,20 +273,32 @@ fn give_missing_normals(mesh: &mut Tessellation) {
     }
 }
 
-/// Where longitude starts anew, lets it go on within a triangle.
-fn close_seams(mesh: &mut Tessellation) {
+/// Where longitude starts anew, lets it go on within a triangle; poles get that of what is next to them.
+fn close_seams(mesh: &mut Tessellation, center: DVec3) {
     let mut beyond: HashMap<u32, u32> = HashMap::new();
     for at in 0..mesh.triangles.len() {
-        let u = mesh.triangles[at].map(|corner| mesh.uvs[corner as usize].x);
-        let (least, greatest) = (u[0].min(u[1]).min(u[2]), u[0].max(u[1]).max(u[2]));
-        if greatest - least > 0.5 {
-            for k in (0..3).filter(|&k| u[k] < 0.5) {
-                let corner = mesh.triangles[at][k];
-                let copy = *beyond
-                    .entry(corner)
-                    .or_insert_with(|| mesh.copy(corner as usize, |mesh, copy| mesh.uvs[copy].x += 1.0));
-                mesh.triangles[at][k] = copy;
-            }
+        let corners = mesh.triangles[at];
+        let is_pole = corners.map(|corner| {
+            let p = mesh.positions[corner as usize] - center;
+            p.x == 0.0 && p.z == 0.0
+        });
+        let u = corners.map(|corner| mesh.uvs[corner as usize].x);
+        let others = || (0..3).filter(|&k| !is_pole[k]);
+        let least = others().map(|k| u[k]).fold(f64::INFINITY, f64::min);
+        let greatest = others().map(|k| u[k]).fold(f64::NEG_INFINITY, f64::max);
+        let wraps = greatest - least > 0.5;
+        for k in others().filter(|&k| wraps && u[k] < 0.5) {
+            let copy = *beyond
+                .entry(corners[k])
+                .or_insert_with(|| mesh.copy(corners[k] as usize, |mesh, copy| mesh.uvs[copy].x += 1.0));
+            mesh.triangles[at][k] = copy;
+        }
+        if let Some(pole) = (0..3).find(|&k| is_pole[k])
+            && others().count() == 2
+        {
+            let sum: f64 = others().map(|k| mesh.uvs[mesh.triangles[at][k] as usize].x).sum();
+            let corner = corners[pole] as usize;
+            mesh.triangles[at][pole] = mesh.copy(corner, |mesh, copy| mesh.uvs[copy].x = 0.5 * sum);
         }
     }
 }
