@@ -12,6 +12,7 @@ use crate::editor::viewport::images::{Images, placing};
 use crate::editor::viewport::lines::{LineVertex, Lines};
 use crate::editor::viewport::piece::{Cluster, Piece};
 use crate::editor::viewport::preview::{Drawing, Placed, Shown};
+use crate::editor::viewport::sieve::{Sides, sift};
 use crate::editor::viewport::terms::{Lights, Terms};
 use crate::error::Result;
 use crate::math::transform::Transform;
@@ -23,6 +24,9 @@ const LINE_INPUTS: [&str; 4] = ["position", "other", "side", "color"];
 
 /// So many triangles are drawn while the camera moves, where there are more.
 pub const MOVING_TRIANGLES: usize = 80_000;
+
+/// From so many triangles on it pays to look which of them reach a pixel, where the processor draws.
+const SIEVED: u64 = 20_000;
 
 /// A piece on the graphics card.
 struct Uploaded {
@@ -72,6 +76,7 @@ struct Batch<'a> {
     is_stand_in: bool,
     material: u32,
     parts: Vec<Range<u32>>,
+    sides: Sides,
     depth: f64,
 }
 
@@ -99,11 +104,11 @@ impl Painter {
         })
     }
 
-    /// Draws the background over the whole picture.
+    /// Draws the background where nothing is.
     ///
     /// # Errors
     /// A limit where there is no room for its image.
-    pub fn sky(&mut self, gl: &Gl, frame: &Frame<'_>) -> Result<()> {
+    fn sky(&mut self, gl: &Gl, frame: &Frame<'_>) -> Result<()> {
         let (bottom, top, up) = sky_colors(&frame.scene.background);
         let image = match &frame.scene.background {
             Background::Image { texture, .. } => Some(self.images.of(gl, texture)?),
@@ -130,18 +135,17 @@ impl Painter {
         set("has_image", Value::Int(i32::from(image.is_some())));
         self.set_film(gl, frame.scene, &self.sky);
         gl.bind_image(0, image);
-        gl.set_mode(Mode { tests_depth: false, writes_depth: false, blends: false, culls: None });
+        gl.set_mode(Mode { tests_depth: true, writes_depth: false, blends: false, culls: None });
         gl.draw_all(&self.nothing, 3);
         Ok(())
     }
 
-    /// Draws all pieces, those that hide what is behind first; says how many triangles were drawn.
+    /// Draws all pieces and, where they leave it free, the background; then what it is seen through. Says how many triangles
+    /// were drawn.
     ///
     /// # Errors
     /// A limit where there is no room.
-    pub fn surfaces(&mut self, gl: &Gl, frame: &Frame<'_>) -> Result<u64> {
-        gl.use_program(&self.surface);
-        self.set_frame(gl, frame);
+    pub fn scene(&mut self, gl: &Gl, frame: &Frame<'_>) -> Result<u64> {
         let mut batches = batches(frame);
         // What hides others from the nearest on, the rest from the farthest on.
         let is_blended = |batch: &Batch<'_>| frame.terms[batch.material as usize].is_blended;
@@ -149,15 +153,23 @@ impl Painter {
             let order = a.depth.total_cmp(&b.depth);
             is_blended(a).cmp(&is_blended(b)).then(if is_blended(a) { order.reverse() } else { order })
         });
-        let mut triangles = 0;
-        for batch in &batches {
-            triangles += batch.parts.iter().map(|part| u64::from(part.end - part.start) / 3).sum::<u64>();
-            self.batch(gl, frame, batch)?;
-        }
+        let (blended, hiding): (Vec<_>, Vec<_>) = batches.iter().partition(|batch| is_blended(batch));
+        let mut triangles = self.surfaces(gl, frame, &hiding)?;
+        self.sky(gl, frame)?;
+        triangles += self.surfaces(gl, frame, &blended)?;
         Ok(triangles)
     }
 
-    fn batch(&mut self, gl: &Gl, frame: &Frame<'_>, batch: &Batch<'_>) -> Result<()> {
+    fn surfaces(&mut self, gl: &Gl, frame: &Frame<'_>, batches: &[&Batch<'_>]) -> Result<u64> {
+        if batches.is_empty() {
+            return Ok(0);
+        }
+        gl.use_program(&self.surface);
+        self.set_frame(gl, frame);
+        batches.iter().map(|batch| self.batch(gl, frame, batch)).sum()
+    }
+
+    fn batch(&mut self, gl: &Gl, frame: &Frame<'_>, batch: &Batch<'_>) -> Result<u64> {
         let terms = &frame.terms[batch.material as usize];
         let texture = |painter: &mut Self, reference: Option<&crate::scene::TextureRef>| -> Result<Option<Image>> {
             let texture = reference.map(|reference| &frame.scene.textures[reference.texture as usize]);
@@ -202,12 +214,19 @@ impl Painter {
         // What a geometry lacks: coordinates of 0 and white.
         gl.set_default(2, Vec4::ZERO);
         gl.set_default(3, Vec4::ONE);
-        let Some(uploaded) = self.pieces.get(&key(batch)) else { return Ok(()) };
+        let Some(uploaded) = self.pieces.get(&key(batch)) else { return Ok(0) };
+        let count = batch.parts.iter().map(|part| u64::from(part.end - part.start) / 3).sum();
         match &uploaded.edges {
             Some(edges) if frame.wireframe => gl.draw(edges, Shape::Lines, &[0..u32::MAX]),
+            _ if gl.is_software && count >= SIEVED => {
+                let rows = clip_rows(frame.view, transform);
+                let indices = sift(batch.piece, &batch.parts, rows, frame.view.size(), batch.sides);
+                gl.draw_listed(&uploaded.geometry, &indices);
+                return Ok(indices.len() as u64 / 3);
+            }
             _ => gl.draw(&uploaded.geometry, Shape::Triangles, &batch.parts),
         }
-        Ok(())
+        Ok(count)
     }
 
     fn upload(&mut self, gl: &Gl, batch: &Batch<'_>, wireframe: bool) -> Result<()> {
@@ -357,8 +376,9 @@ fn batches<'a>(frame: &Frame<'a>) -> Vec<Batch<'a>> {
                 _ => {
                     let depth = frame.view.depth(placed.transform.point_to_world(cluster.center.as_dvec3()));
                     let parts = vec![cluster.indices.clone()];
+                    let sides = if hides { sight.sides(placed, piece) } else { Sides::Both };
                     let is_stand_in = stand_in.is_some();
-                    batches.extend(latest.replace(Batch { placed, piece, is_stand_in, material, parts, depth }));
+                    batches.extend(latest.replace(Batch { placed, piece, is_stand_in, material, parts, sides, depth }));
                 }
             }
         }
@@ -395,6 +415,15 @@ impl Sight {
         let center = cluster.center.as_dvec3();
         // Written so that NaN is seen.
         self.planes.iter().all(|plane| !(dot(plane.truncate(), center) + plane.w < -f64::from(cluster.radius)))
+    }
+
+    /// Which sides of triangles are seen.
+    fn sides(&self, placed: &Placed, piece: &Piece) -> Sides {
+        match (self.from, placed.transform.is_mirroring() != piece.is_inside_out) {
+            (None, _) => Sides::Both,
+            (Some(_), false) => Sides::CounterClockwise,
+            (Some(_), true) => Sides::Clockwise,
+        }
     }
 
     /// Whether all of its faces look away.
