@@ -55,8 +55,8 @@ pub struct Attribute<'a> {
 pub enum Format {
     /// So many f32.
     Floats(i32),
-    /// Ten bits each, signed, as fractions.
-    Packed,
+    /// Four i16 as fractions.
+    Signed,
     /// Four u16 as fractions.
     Fractions,
 }
@@ -270,7 +270,7 @@ impl Gl {
                 for &(number, format, start) in attribute.fields {
                     let (count, kind, is_fraction) = match format {
                         Format::Floats(count) => (count, glow::FLOAT, false),
-                        Format::Packed => (4, glow::INT_2_10_10_10_REV, true),
+                        Format::Signed => (4, glow::SHORT, true),
                         Format::Fractions => (4, glow::UNSIGNED_SHORT, true),
                     };
                     gl.enable_vertex_attrib_array(number);

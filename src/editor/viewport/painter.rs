@@ -11,7 +11,7 @@ use crate::editor::viewport::camera::{Eye, View};
 use crate::editor::viewport::gl::{Attribute, Format, Geometry, Gl, Image, Mode, Program, Shape, Value};
 use crate::editor::viewport::images::{Images, placing};
 use crate::editor::viewport::lines::{LineVertex, Lines};
-use crate::editor::viewport::piece::{Cluster, Piece};
+use crate::editor::viewport::piece::{Cluster, Piece, Vertex};
 use crate::editor::viewport::preview::{Drawing, Placed, Shown};
 use crate::editor::viewport::sieve::{Sides, sift};
 use crate::editor::viewport::terms::{Lights, Terms};
@@ -533,8 +533,8 @@ fn sky_colors(background: &Background) -> (Rgb, Rgb, Vec3) {
 fn geometry(gl: &Gl, piece: &Piece, indices: &[u32]) -> Result<Geometry> {
     let vertices = Attribute {
         bytes: bytemuck::cast_slice(&piece.vertices),
-        fields: &[(0, Format::Floats(3), 0), (1, Format::Packed, 12)],
-        stride: 16,
+        fields: &[(0, Format::Floats(3), 0), (1, Format::Signed, 12)],
+        stride: size_of::<Vertex>() as i32,
     };
     let mut attributes = vec![vertices];
     if let Some(uvs) = &piece.uvs {

@@ -12,14 +12,14 @@ use crate::math::vector::{cross, dot, length, normalize};
 /// Triangles of a cluster at most: enough that each is worth a decision, few enough that their normals agree.
 const CLUSTER: usize = 512;
 
-/// A vertex: 16 bytes.
+/// A vertex: 20 bytes.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct Vertex {
     /// Relative to the piece's origin, divided by its scale.
     pub position: [f32; 3],
-    /// Unit normal: x, y and z from the lowest bit on, ten bits each, signed.
-    pub normal: u32,
+    /// Unit normal in fractions of 32767, and 0. Mesa's software takes three times ten bits one by one, these together.
+    pub normal: [i16; 4],
 }
 
 /// Neighbouring triangles of one material.
@@ -225,7 +225,7 @@ impl Part {
         let material = triangles.first().map_or(0, |first| (first.0 >> 32) as u32);
         let mut part =
             Self { material, vertices: Vec::new(), uvs: Vec::new(), colors: Vec::new(), indices: Vec::new() };
-        let mut numbers: HashMap<(u32, u32), u32> = HashMap::with_capacity(triangles.len());
+        let mut numbers: HashMap<(u32, [i16; 4]), u32> = HashMap::with_capacity(triangles.len());
         for &(_, triangle) in triangles {
             let triangle = triangle as usize;
             let corners = source.corners(triangle);
@@ -254,16 +254,15 @@ fn bounds_of(vertices: &[Vertex]) -> (Vec3, Vec3) {
     if vertices.is_empty() { (Vec3::ZERO, Vec3::ZERO) } else { bounds }
 }
 
-/// A unit vector in three times ten bits.
-fn packed(normal: DVec3) -> u32 {
-    let bits = |x: f64| ((x * 511.0).round() as i32 as u32) & 0x3ff;
-    bits(normal.x) | bits(normal.y) << 10 | bits(normal.z) << 20
+/// A unit vector as [`Vertex::normal`] holds it.
+fn packed(normal: DVec3) -> [i16; 4] {
+    let [x, y, z] = (normal * 32767.0).round().to_array().map(|x| x as i16);
+    [x, y, z, 0]
 }
 
 /// What [`Vertex::normal`] holds, not quite of unit length.
-pub fn unpacked(normal: u32) -> Vec3 {
-    let component = |shift: u32| ((normal << (22 - shift)) as i32 >> 22) as f32 / 511.0;
-    Vec3::new(component(0), component(10), component(20))
+pub fn unpacked([x, y, z, _]: [i16; 4]) -> Vec3 {
+    Vec3::new(f32::from(x), f32::from(y), f32::from(z)) / 32767.0
 }
 
 #[cfg(test)]
@@ -277,7 +276,7 @@ mod tests {
             let random = |k: u32| unit(hash2(seed, k)) * 2.0 - 1.0;
             let Some(normal) = normalize(DVec3::new(random(0), random(1), random(2))) else { continue };
             let back = unpacked(packed(normal)).as_dvec3();
-            assert!((back - normal).abs().max_element() < 1.1e-3, "{normal} {back}");
+            assert!((back - normal).abs().max_element() < 2e-5, "{normal} {back}");
         }
     }
 }

@@ -7,7 +7,7 @@ use std::ops::Range;
 use glam::{DVec4, Vec3};
 use rayon::prelude::*;
 
-use crate::editor::viewport::piece::Piece;
+use crate::editor::viewport::piece::{Piece, Vertex};
 use crate::math::vector::dot_f32;
 
 /// How far a corner may be from where it is drawn, in pixels: OpenGL rounds to at least a 16th, f32 at the far end of a
@@ -63,7 +63,7 @@ pub fn sift(piece: &Piece, parts: &[Range<u32>], rows: [DVec4; 4], size: (f64, f
 fn places(piece: &Piece, rows: [DVec4; 4], (width, height): (f64, f64)) -> Vec<[f32; 2]> {
     let [x, y, z, w] = rows.map(|row| row.as_vec4());
     let (width, height) = (0.5 * width as f32, 0.5 * height as f32);
-    let place = |vertex: &crate::editor::viewport::piece::Vertex| {
+    let place = |vertex: &Vertex| {
         let p = Vec3::from_array(vertex.position);
         let depth = dot_f32(w.truncate(), p) + w.w;
         let is_before = dot_f32(z.truncate(), p) + z.w < -depth;

@@ -10,7 +10,10 @@ use crate::scene::{Falloff, Light, LightKind, Material, Rgb, Scene, Texture, Tex
 pub const MOST_LIGHTS: usize = 16;
 
 /// Glass stays visible: the least share that it hides of what is behind.
-const LEAST_OPACITY: f32 = 0.15;
+const LEAST_OPACITY: f32 = 0.3;
+
+/// How bright that share is.
+const VEIL: f32 = 0.4;
 
 /// The terms of a material that do not differ from point to point but for its images.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,7 +63,8 @@ impl Terms {
         let is_unlit = detail.is_some_and(|detail| matches!(detail.rule, Rule::Unlit { .. }));
         let (emission, tinted) = if is_unlit { (Rgb::ZERO, point.emission) } else { (point.emission, Rgb::ZERO) };
         let ambient = if point.ambient.is_none() { scene.ambient * point.diffuse } else { Rgb::ZERO };
-        let steady = point.ambient.unwrap_or(Rgb::ZERO);
+        // Glass is a veil of its own colour.
+        let steady = point.ambient.unwrap_or(Rgb::ZERO) + point.kt * VEIL;
         let mode = alpha.map(|alpha| alpha.mode);
         let cutoff = if let Some(AlphaMode::Mask { cutoff }) = mode { cutoff } else { 0.0 };
         let through = luminance(point.kt).clamp(0.0, 1.0) as f32;
@@ -168,7 +172,7 @@ mod tests {
         let material = Material { kt: Rgb::splat(0.5), ks: Rgb::splat(0.5), ..Material::default() };
         let terms = Terms::of(&scene, &material);
         assert_eq!((terms.tinted, terms.diffuse), (Rgb::splat(0.2), Rgb::splat(0.4)));
-        assert_eq!((terms.shine, terms.steady), (Rgb::splat(0.5), Rgb::ZERO));
+        assert_eq!((terms.shine, terms.steady), (Rgb::splat(0.5), Rgb::splat(0.5 * VEIL)));
         assert!(terms.is_blended && !terms.hides());
         let own = Material { ambient: Some(Rgb::X), emission: Rgb::Y, ..Material::default() };
         assert_eq!(Terms::of(&scene, &own).steady, Rgb::new(1.0, 1.0, 0.0));

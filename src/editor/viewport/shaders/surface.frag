@@ -1,6 +1,6 @@
 in vec4 v_tinted;
-in vec3 v_plain;
 #ifdef IMAGES
+in vec3 v_plain;
 in vec2 v_uv;
 in vec2 v_glow_uv;
 
@@ -19,8 +19,9 @@ out vec4 seen;
 
 void main() {
     vec4 texel = vec4(1.0);
-    vec3 light = v_plain;
+    vec3 light = vec3(0.0);
 #ifdef IMAGES
+    light = v_plain;
     if (has_image) {
         texel = texture(image, v_uv);
     }

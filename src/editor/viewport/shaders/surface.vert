@@ -40,8 +40,8 @@ uniform vec4 glow_offset;
 #endif
 
 out vec4 v_tinted;
-out vec3 v_plain;
 #ifdef IMAGES
+out vec3 v_plain;
 out vec2 v_uv;
 out vec2 v_glow_uv;
 #endif
@@ -103,5 +103,9 @@ void main() {
     plain += mirror * mix(sky_bottom, sky_top, 0.5 + 0.5 * dot(reflected, sky_up));
 #endif
     v_tinted = vec4((tinted + diffuse * lit) * color.rgb, color.a);
+#ifdef IMAGES
     v_plain = plain;
+#else
+    v_tinted.rgb += plain;
+#endif
 }
