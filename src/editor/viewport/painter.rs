@@ -269,7 +269,7 @@ impl Painter {
         let Some(uploaded) = self.pieces.get(&key(batch)) else { return Ok(0) };
         let count = batch.parts.iter().map(|part| u64::from(part.end - part.start) / 3).sum();
         match &uploaded.edges {
-            Some(edges) if frame.wireframe => gl.draw(edges, Shape::Lines, &[0..u32::MAX]),
+            Some(edges) if frame.wireframe => gl.draw(edges, Shape::Lines, std::slice::from_ref(&(0..u32::MAX))),
             _ if gl.is_software && count >= SIEVED => {
                 let rows = clip_rows(frame.view, transform);
                 let indices = sift(batch.piece, &batch.parts, rows, frame.view.size(), batch.sides);
@@ -283,16 +283,15 @@ impl Painter {
 
     fn upload(&mut self, gl: &Gl, batch: &Batch<'_>, wireframe: bool) -> Result<()> {
         let piece = batch.piece;
-        let key = key(batch);
-        if !self.pieces.contains_key(&key) {
-            let geometry = geometry(gl, piece, &piece.indices)?;
-            let uploaded = Uploaded { _shown: batch.placed.shown.clone(), geometry, edges: None, is_used: true };
-            self.pieces.insert(key, uploaded);
-        }
-        if let Some(uploaded) = self.pieces.get_mut(&key)
-            && uploaded.edges.is_none()
-            && wireframe
-        {
+        let uploaded = match self.pieces.entry(key(batch)) {
+            Entry::Occupied(known) => known.into_mut(),
+            Entry::Vacant(place) => {
+                let geometry = geometry(gl, piece, &piece.indices)?;
+                let shown = batch.placed.shown.clone();
+                place.insert(Uploaded { _shown: shown, geometry, edges: None, is_used: true })
+            }
+        };
+        if wireframe && uploaded.edges.is_none() {
             uploaded.edges = Some(geometry(gl, piece, &edges(piece))?);
         }
         Ok(())
