@@ -95,7 +95,7 @@ fn check(gl: &Arc<eframe::glow::Context>) {
         // What shadows, mirrors and glass show is not drawn, nor small pools of light on large triangles: the shares of pixels
         // that are alike are what each scene had when this was written, less a little.
         for (name, least) in
-            [("quadrics", 0.85), ("seed_camera", 0.5), ("teapot", 0.7), ("textured_crate", 0.75), ("terrain", 0.5)]
+            [("quadrics", 0.85), ("seed_camera", 0.9), ("teapot", 0.75), ("textured_crate", 0.77), ("cornell_box", 0.9)]
         {
             let scene = Arc::new(load(&root.join(format!("scenes/{name}.toml"))));
             let camera = *scene.camera();

@@ -10,13 +10,16 @@ use rayon::prelude::*;
 use crate::editor::viewport::piece::{Piece, Vertex};
 use crate::math::vector::dot_f32;
 
-/// How far a corner may be from where it is drawn, in pixels: OpenGL rounds to at least a 16th, f32 at the far end of a
-/// large picture to less.
-const SLACK: f32 = 0.0625;
+/// How far a corner may be from where it is drawn, in pixels: what draws by processors rounds to a 256th, and f32 at the far
+/// end of a picture of 4096 pixels to less.
+const SLACK: f32 = 1.0 / 64.0;
 
 /// The least area, in pixels, for which the side that is seen is certain: what the slack may change of a triangle as long
 /// as a pixel.
 const CERTAIN_AREA: f32 = 2.0 * SLACK;
+
+/// Of so many pixels' centres along each side of its box it is looked whether a triangle covers one.
+const MOST_CENTRES: f32 = 3.0;
 
 /// Which triangles can be left out for the side that they show.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,11 +47,14 @@ pub fn sift(piece: &Piece, parts: &[Range<u32>], rows: [DVec4; 4], size: (f64, f
             Sides::CounterClockwise => twice_area < -CERTAIN_AREA,
             Sides::Clockwise => twice_area > CERTAIN_AREA,
         };
-        let between = |least: f32, most: f32| (most - 0.5).floor() < (least - 0.5).ceil();
-        let beside = right < 0.0 || left > width || high < 0.0 || low > height;
         // What is partly behind the eye has no place, which is NaN, and is kept.
-        let is_known = (a[0] + b[0] + c[0]).is_finite();
-        !is_known || !(away || beside || between(left, right) || between(low, high))
+        if !(a[0] + b[0] + c[0]).is_finite() {
+            return true;
+        }
+        if away || right < 0.0 || left > width || high < 0.0 || low > height {
+            return false;
+        }
+        covers_a_centre([a, b, c], twice_area, [left, right], [low, high])
     };
     let chunks = parts.iter().flat_map(|part| piece.indices[part.start as usize..part.end as usize].chunks(3 * 4096));
     let kept: Vec<Vec<u32>> = chunks
@@ -57,6 +63,37 @@ pub fn sift(piece: &Piece, parts: &[Range<u32>], rows: [DVec4; 4], size: (f64, f
         .map(|chunk| chunk.chunks_exact(3).filter(|corners| reaches(corners)).flatten().copied().collect())
         .collect();
     kept.concat()
+}
+
+/// Whether a triangle within a box may cover the centre of a pixel; large ones do.
+fn covers_a_centre(corners: [[f32; 2]; 3], twice_area: f32, across: [f32; 2], upward: [f32; 2]) -> bool {
+    let centres = |[least, most]: [f32; 2]| ((least - 0.5).ceil() + 0.5, (most - 0.5).floor() + 0.5);
+    let ((left, right), (low, high)) = (centres(across), centres(upward));
+    if right < left || high < low {
+        return false;
+    }
+    if right - left >= MOST_CENTRES || high - low >= MOST_CENTRES {
+        return true;
+    }
+    let side = if twice_area < 0.0 { -1.0 } else { 1.0 };
+    // Left of all three edges, or hardly right of one.
+    let edges = [0, 1, 2].map(|k| {
+        let ([x, y], [to_x, to_y]) = (corners[k], corners[(k + 1) % 3]);
+        let (dx, dy) = ((to_x - x) * side, (to_y - y) * side);
+        move |px: f32, py: f32| dx * (py - y) - dy * (px - x) >= -SLACK * (dx.abs() + dy.abs())
+    });
+    let mut y = low;
+    while y <= high {
+        let mut x = left;
+        while x <= right {
+            if edges.iter().all(|is_left| is_left(x, y)) {
+                return true;
+            }
+            x += 1.0;
+        }
+        y += 1.0;
+    }
+    false
 }
 
 /// Where vertices are in the picture, in pixels from the lower left; NaN before the nearest that is seen.
@@ -101,7 +138,9 @@ mod tests {
         assert_eq!(left(at(2.0, 2.0, 3.0), Sides::Both), 3);
         assert_eq!(left(at(2.4, 2.4, 0.3), Sides::Both), 3, "around the centre at 2.5");
         assert_eq!(left(at(2.6, 2.6, 0.3), Sides::Both), 0, "between centres");
-        assert_eq!(left(at(2.1, 2.6, 1.0), Sides::Both), 3, "from there to the next row");
+        assert_eq!(left(at(2.3, 2.3, 0.3), Sides::Both), 0, "the box alone is around a centre");
+        assert_eq!(left(at(2.4, 2.4, 1.0), Sides::Both), 3);
+        assert_eq!(left([[0.0, 2.6], [9.0, 2.6], [0.0, 2.7]], Sides::Both), 0, "between rows");
         assert_eq!(left(at(12.0, 2.0, 3.0), Sides::Both), 0, "beside the picture");
         assert_eq!(left(at(-2.0, -2.0, 9.0), Sides::Both), 3);
     }
