@@ -29,6 +29,8 @@ pub struct Cluster {
     pub material: u32,
     /// Which of the piece's indices are its triangles'.
     pub indices: Range<u32>,
+    /// Which of the piece's vertices are its own.
+    pub vertices: Range<u32>,
     /// The middle of its box.
     pub center: Vec3,
     /// The farthest vertex from there.
@@ -161,6 +163,7 @@ impl Piece {
         self.clusters.push(Cluster {
             material: part.material,
             indices: start..self.indices.len() as u32,
+            vertices: first..first + part.vertices.len() as u32,
             center,
             radius,
             axis: axis.as_vec3(),

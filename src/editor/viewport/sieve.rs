@@ -4,11 +4,10 @@
 
 use std::ops::Range;
 
-use glam::{DVec4, Vec3};
+use glam::{DVec4, Vec3, Vec4};
 use rayon::prelude::*;
 
-use crate::editor::viewport::piece::{Piece, Vertex};
-use crate::math::vector::dot_f32;
+use crate::editor::viewport::piece::{Cluster, Piece, Vertex};
 
 /// How far a corner may be from where it is drawn, in pixels: what draws by processors rounds to a 256th, and f32 at the far
 /// end of a picture of 4096 pixels to less.
@@ -19,7 +18,7 @@ const SLACK: f32 = 1.0 / 64.0;
 const CERTAIN_AREA: f32 = 2.0 * SLACK;
 
 /// Of so many pixels' centres along each side of its box it is looked whether a triangle covers one.
-const MOST_CENTRES: f32 = 3.0;
+const MOST_CENTRES: i32 = 3;
 
 /// Which triangles can be left out for the side that they show.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -33,83 +32,128 @@ pub enum Sides {
 }
 
 /// Those of a piece's indices, within some parts, whose triangles may cover the centre of a pixel; `rows` is the matrix from
-/// vertices to clip space, for a picture of this size.
+/// vertices to clip space, for a picture of this size. Parts are ascending, and made of whole clusters.
 pub fn sift(piece: &Piece, parts: &[Range<u32>], rows: [DVec4; 4], size: (f64, f64), sides: Sides) -> Vec<u32> {
-    let places = places(piece, rows, size);
-    let (width, height) = (size.0 as f32, size.1 as f32);
-    let reaches = |corners: &[u32]| {
-        let [a, b, c] = [0, 1, 2].map(|k| places[corners[k] as usize]);
-        let (left, right) = (a[0].min(b[0]).min(c[0]) - SLACK, a[0].max(b[0]).max(c[0]) + SLACK);
-        let (low, high) = (a[1].min(b[1]).min(c[1]) - SLACK, a[1].max(b[1]).max(c[1]) + SLACK);
+    let lens = Lens::of(rows, size);
+    let mut parts = parts.iter().peekable();
+    let is_in_parts = |cluster: &&Cluster| {
+        while parts.next_if(|part| part.end <= cluster.indices.start).is_some() {}
+        parts.peek().is_some_and(|part| part.start <= cluster.indices.start)
+    };
+    let clusters: Vec<&Cluster> = piece.clusters.iter().filter(is_in_parts).collect();
+    let kept: Vec<Vec<u32>> = clusters
+        .par_chunks(16)
+        .map(|clusters| {
+            let (mut kept, mut places) = (Vec::new(), Vec::new());
+            clusters.iter().for_each(|cluster| lens.sift(piece, cluster, sides, &mut places, &mut kept));
+            kept
+        })
+        .collect();
+    kept.concat()
+}
+
+/// What brings vertices into the picture, in pixels from the lower left.
+struct Lens {
+    x: Vec4,
+    y: Vec4,
+    z: Vec4,
+    w: Vec4,
+    half_size: [f32; 2],
+}
+
+impl Lens {
+    fn of(rows: [DVec4; 4], (width, height): (f64, f64)) -> Self {
+        let [x, y, z, w] = rows.map(|row| row.as_vec4());
+        Self { x, y, z, w, half_size: [0.5 * width as f32, 0.5 * height as f32] }
+    }
+
+    /// Where a vertex is; NaN before the nearest that is seen.
+    #[inline(always)]
+    fn place(&self, vertex: &Vertex) -> [f32; 2] {
+        let p = Vec3::from_array(vertex.position);
+        let along = |row: Vec4| row.x * p.x + row.y * p.y + row.z * p.z + row.w;
+        let depth = along(self.w);
+        let inverse = if (along(self.z) >= -depth) & (depth > 0.0) { 1.0 / depth } else { f32::NAN };
+        let [width, height] = self.half_size;
+        [(along(self.x) * inverse + 1.0) * width, (along(self.y) * inverse + 1.0) * height]
+    }
+
+    /// Appends the indices of those of a cluster's triangles that may cover a centre; `places` is room for its vertices.
+    fn sift(&self, piece: &Piece, cluster: &Cluster, sides: Sides, places: &mut Vec<[f32; 2]>, kept: &mut Vec<u32>) {
+        let first = cluster.vertices.start;
+        let vertices = &piece.vertices[first as usize..cluster.vertices.end as usize];
+        places.clear();
+        places.extend(vertices.iter().map(|vertex| self.place(vertex)));
+        let indices = &piece.indices[cluster.indices.start as usize..cluster.indices.end as usize];
+        for corners in indices.chunks_exact(3) {
+            let [a, b, c] = [corners[0], corners[1], corners[2]].map(|corner| places[(corner - first) as usize]);
+            if self.may_cover([a, b, c], sides) {
+                kept.extend_from_slice(corners);
+            }
+        }
+    }
+
+    /// Whether a triangle may cover the centre of a pixel.
+    #[inline(always)]
+    fn may_cover(&self, [a, b, c]: [[f32; 2]; 3], sides: Sides) -> bool {
         let twice_area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
         let away = match sides {
             Sides::Both => false,
             Sides::CounterClockwise => twice_area < -CERTAIN_AREA,
             Sides::Clockwise => twice_area > CERTAIN_AREA,
         };
-        // What is partly behind the eye has no place, which is NaN, and is kept.
-        if !(a[0] + b[0] + c[0]).is_finite() {
-            return true;
-        }
-        if away || right < 0.0 || left > width || high < 0.0 || low > height {
+        if away {
             return false;
         }
-        covers_a_centre([a, b, c], twice_area, [left, right], [low, high])
-    };
-    let chunks = parts.iter().flat_map(|part| piece.indices[part.start as usize..part.end as usize].chunks(3 * 4096));
-    let kept: Vec<Vec<u32>> = chunks
-        .collect::<Vec<_>>()
-        .into_par_iter()
-        .map(|chunk| chunk.chunks_exact(3).filter(|corners| reaches(corners)).flatten().copied().collect())
-        .collect();
-    kept.concat()
-}
-
-/// Whether a triangle within a box may cover the centre of a pixel; large ones do.
-fn covers_a_centre(corners: [[f32; 2]; 3], twice_area: f32, across: [f32; 2], upward: [f32; 2]) -> bool {
-    let centres = |[least, most]: [f32; 2]| ((least - 0.5).ceil() + 0.5, (most - 0.5).floor() + 0.5);
-    let ((left, right), (low, high)) = (centres(across), centres(upward));
-    if right < left || high < low {
-        return false;
-    }
-    if right - left >= MOST_CENTRES || high - low >= MOST_CENTRES {
-        return true;
-    }
-    let side = if twice_area < 0.0 { -1.0 } else { 1.0 };
-    // Left of all three edges, or hardly right of one.
-    let edges = [0, 1, 2].map(|k| {
-        let ([x, y], [to_x, to_y]) = (corners[k], corners[(k + 1) % 3]);
-        let (dx, dy) = ((to_x - x) * side, (to_y - y) * side);
-        move |px: f32, py: f32| dx * (py - y) - dy * (px - x) >= -SLACK * (dx.abs() + dy.abs())
-    });
-    let mut y = low;
-    while y <= high {
-        let mut x = left;
-        while x <= right {
-            if edges.iter().all(|is_left| is_left(x, y)) {
-                return true;
-            }
-            x += 1.0;
+        // What is partly behind the eye has no place, which is NaN, and is kept.
+        if twice_area.is_nan() {
+            return true;
         }
-        y += 1.0;
+        let [width, height] = self.half_size;
+        let span =
+            |axis: usize| (lesser(lesser(a[axis], b[axis]), c[axis]), -lesser(lesser(-a[axis], -b[axis]), -c[axis]));
+        let ((left, right), (low, high)) = (span(0), span(1));
+        if (right < -SLACK) | (left > 2.0 * width + SLACK) | (high < -SLACK) | (low > 2.0 * height + SLACK) {
+            return false;
+        }
+        // Centres beside the picture do not count, and whole numbers hold the others.
+        let (left, right) = (left.max(-1.0), right.min(2.0 * width + 1.0));
+        let (low, high) = (low.max(-1.0), high.min(2.0 * height + 1.0));
+        // The first and the last centre that is not outside; large triangles have many.
+        let (first_x, last_x) = (-floor(0.5 + SLACK - left), floor(right - 0.5 + SLACK));
+        let (first_y, last_y) = (-floor(0.5 + SLACK - low), floor(high - 0.5 + SLACK));
+        if (last_x < first_x) | (last_y < first_y) {
+            return false;
+        }
+        if (last_x - first_x >= MOST_CENTRES) | (last_y - first_y >= MOST_CENTRES) {
+            return true;
+        }
+        let side = if twice_area < 0.0 { -1.0 } else { 1.0 };
+        (first_y..=last_y)
+            .any(|y| (first_x..=last_x).any(|x| is_within([a, b, c], side, [x as f32 + 0.5, y as f32 + 0.5])))
     }
-    false
 }
 
-/// Where vertices are in the picture, in pixels from the lower left; NaN before the nearest that is seen.
-fn places(piece: &Piece, rows: [DVec4; 4], (width, height): (f64, f64)) -> Vec<[f32; 2]> {
-    let [x, y, z, w] = rows.map(|row| row.as_vec4());
-    let (width, height) = (0.5 * width as f32, 0.5 * height as f32);
-    let place = |vertex: &Vertex| {
-        let p = Vec3::from_array(vertex.position);
-        let depth = dot_f32(w.truncate(), p) + w.w;
-        let is_before = dot_f32(z.truncate(), p) + z.w < -depth;
-        let inverse = if depth > 0.0 && !is_before { 1.0 / depth } else { f32::NAN };
-        let across = (dot_f32(x.truncate(), p) + x.w) * inverse;
-        let upward = (dot_f32(y.truncate(), p) + y.w) * inverse;
-        [(across + 1.0) * width, (upward + 1.0) * height]
-    };
-    piece.vertices.par_iter().with_min_len(4096).map(place).collect()
+/// Whether a point is left of all three edges of a triangle, or hardly right of one; `side` is -1 for clockwise ones.
+#[inline(always)]
+fn is_within(corners: [[f32; 2]; 3], side: f32, [x, y]: [f32; 2]) -> bool {
+    (0..3).all(|k| {
+        let ([from_x, from_y], [to_x, to_y]) = (corners[k], corners[(k + 1) % 3]);
+        let (dx, dy) = ((to_x - from_x) * side, (to_y - from_y) * side);
+        dx * (y - from_y) - dy * (x - from_x) >= -SLACK * (dx.abs() + dy.abs())
+    })
+}
+
+#[inline(always)]
+fn lesser(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+/// The greatest whole number that is not above a number, without a call.
+#[inline(always)]
+fn floor(x: f32) -> i32 {
+    let cut = x as i32;
+    cut.saturating_sub(i32::from(x < cut as f32))
 }
 
 #[cfg(test)]
