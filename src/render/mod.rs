@@ -30,5 +30,6 @@ pub mod world;
 pub use answers::Answers;
 pub use film::{Aov, AovKind, Film};
 pub use intersect::Intersect;
+pub use ray_tracing::Tile;
 pub use renderer::{BuildStats, Renderer};
 pub use settings::{Coverage, Crop, RayCounts, RenderSettings, RenderStats, ThreadSeconds};

@@ -30,10 +30,14 @@ const STACK: usize = 16 << 20;
 const LARGEST_PICTURE: u64 = 1 << 28;
 
 /// One tile's pixels, rows from the top.
-struct Tile {
-    area: Crop,
-    color: Vec<[f32; 3]>,
-    alpha: Vec<f32>,
+#[derive(Debug, Clone)]
+pub struct Tile {
+    /// Where it is in the picture.
+    pub area: Crop,
+    /// Linear colours.
+    pub color: Vec<[f32; 3]>,
+    /// How much of each pixel is covered; empty unless the background is transparent.
+    pub alpha: Vec<f32>,
     aovs: Vec<Vec<f32>>,
     counts: RayCounts,
     seconds: ThreadSeconds,
@@ -41,7 +45,8 @@ struct Tile {
 
 /// Renders the scene through its active camera into a film.
 ///
-/// The picture depends on the scene and its film settings alone. Cancelled work returns the tiles that are finished,
+/// The picture depends on the scene and its film settings alone. `finished` is called for each tile once it is, on the thread that
+/// rendered it. Cancelled work returns the tiles that are finished,
 /// with `complete` false.
 ///
 /// # Errors
@@ -53,6 +58,7 @@ pub fn ray_tracing<I: Answers>(
     intersect: &I,
     settings: &RenderSettings,
     progress: &dyn Progress,
+    finished: &(dyn Fn(&Tile) + Sync),
 ) -> Result<Film> {
     let film = &scene.film;
     film.check()?;
@@ -80,9 +86,10 @@ pub fn ray_tracing<I: Answers>(
     let start = std::time::Instant::now();
     let render_tile = |&tile: &Crop| {
         let tracer = Tracer::new(scene, world, intersect);
-        let finished = tile_pixels(&tracer, &camera, tile, &settings.aovs, counter.as_ref(), progress)?;
+        let tile = tile_pixels(&tracer, &camera, tile, &settings.aovs, counter.as_ref(), progress)?;
+        finished(&tile);
         progress.advance(1);
-        Some(finished)
+        Some(tile)
     };
     let finished: Vec<Option<Tile>> = pool.install(|| tiles.par_iter().map(render_tile).collect());
     let seconds = start.elapsed().as_secs_f64();
