@@ -6,12 +6,16 @@
 
 pub mod command;
 pub mod document;
+pub mod gizmo;
 pub mod history;
 pub mod item;
+pub mod job;
+pub mod navigate;
 pub mod placement;
 pub mod session;
 #[cfg(test)]
 mod tests;
+pub mod viewport;
 
 pub use command::Command;
 pub use item::{Item, Kind};

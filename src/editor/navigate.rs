@@ -120,9 +120,8 @@ impl Looking {
         self.up = if is_vertical { DVec3::new(-sin_a, 0.0, -cos_a) * sin_e.signum() } else { DVec3::Y };
         self.eye = self.target + backward * length(self.eye - self.target);
         // Sines of straight angles are not quite 0.
-        let round = |v: DVec3, size: f64| {
-            DVec3::from_array(v.to_array().map(|x| if x.abs() < 1e-12 * size { 0.0 } else { x }))
-        };
+        let round =
+            |v: DVec3, size: f64| DVec3::from_array(v.to_array().map(|x| if x.abs() < 1e-12 * size { 0.0 } else { x }));
         self.up = round(self.up, 1.0);
         self.eye = self.target + round(self.eye - self.target, length(self.eye - self.target));
     }

@@ -158,7 +158,7 @@ impl CameraRays {
 
     /// Where the ray through a point starts, and its direction, of unit length for parallel rays and else of any.
     #[inline(always)]
-    fn line(&self, x: f64, y: f64) -> (DVec3, DVec3) {
+    pub(crate) fn line(&self, x: f64, y: f64) -> (DVec3, DVec3) {
         let across = 2.0 * x / self.width - 1.0;
         let upward = 1.0 - 2.0 * y / self.height;
         match self.kind {

@@ -83,7 +83,8 @@ impl Assets {
         if let Some(kept) = self.images.get_mut(&key)
             && kept.is_fresh(self.reading)
         {
-            return Ok(kept.thing.clone());
+            // As if it was read again, by what it is called now.
+            return Ok(Texture { name: path.display().to_string(), ..kept.thing.clone() });
         }
         let texture = read_texture(path, limits)?;
         self.images.insert(key, Kept::new(texture.clone(), stamps([path]), self.reading));
