@@ -204,7 +204,11 @@ fn background(kind: BackgroundKind) -> &'static str {
 fn color(color: Rgb) -> String {
     let [r, g, b] = color.to_array();
     // By their bits: 0 and -0 are not the same.
-    if r.to_bits() == g.to_bits() && g.to_bits() == b.to_bits() { format!("{r:?}") } else { format!("{r:?} {g:?} {b:?}") }
+    if r.to_bits() == g.to_bits() && g.to_bits() == b.to_bits() {
+        format!("{r:?}")
+    } else {
+        format!("{r:?} {g:?} {b:?}")
+    }
 }
 
 fn vector(vector: DVec3) -> String {

@@ -27,6 +27,7 @@ pub use node::{
     Arrival, BackgroundKind, Crossing, Dark, End, Found, LightTerm, Lighting, RayNode, Stop, Surface, Term, Way,
 };
 use recorder::Recorder;
+pub use replay::replay;
 
 /// The most that is recorded of a pixel: rays, lights at points and surfaces between them, all samples together. That many
 /// take about 100 MB.
