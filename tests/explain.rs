@@ -154,8 +154,10 @@ fn check(mut scene: Scene, step: u32, name: &str) -> Seen {
 fn terms_add_up_to_the_bits_of_the_picture() {
     let shown = std::fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes")).unwrap();
     let shown = shown.map(|entry| format!("scenes/{}", entry.unwrap().file_name().to_string_lossy()));
-    let shown: Vec<String> = shown.filter(|name| name.ends_with(".toml")).collect();
-    assert!(shown.len() >= 8, "{shown:?}");
+    // The mesh of the terrain is made by an example and not always there.
+    let has_mesh = |name: &String| !name.ends_with("terrain.toml") || Path::new("meshes/terrain.glb").exists();
+    let shown: Vec<String> = shown.filter(|name| name.ends_with(".toml")).filter(has_mesh).collect();
+    assert!(shown.len() >= 7, "{shown:?}");
     let golden = ["spot_cone", "orthographic", "instances", "normals", "gltf_import", "transparent_shadow"];
     let more = ["total_internal_reflection", "transparent_background", "panorama", "refraction"];
     let golden = golden.into_iter().chain(more).map(|name| format!("tests/golden/{name}.toml"));
@@ -237,7 +239,7 @@ fn the_shadow_of_the_red_sphere_is_its() {
     let explanation = all(&renderer, 158, 335);
     let ray = &explanation.samples[0].rays.as_ref().unwrap()[0];
     let surface = surface(ray);
-    assert_eq!((surface.found.object.as_str(), surface.found.material.as_str()), ("ground", "ground"));
+    assert_eq!((surface.found.object.as_str(), surface.found.material.as_str()), ("ground/box", "ground"));
     assert!(surface.from_outside && surface.normal == DVec3::Y && surface.point.y == 0.0);
     let expected = DVec3::new(-2.533, 0.0, -1.0);
     assert!((surface.point - expected).length() < 0.05, "{}", surface.point);
@@ -264,8 +266,8 @@ fn a_mirror_shows_a_reflected_ray_until_the_depth_ends() {
     let mut scene = scene_file("scenes/mirrors.toml");
     scene.film.samples = 1;
     let renderer = build(scene.clone());
-    // The upper left corner of the left mirror, with nothing before it.
-    let explanation = all(&renderer, 300, 100);
+    // The middle of the left mirror, with nothing before it.
+    let explanation = all(&renderer, 250, 260);
     let rays = explanation.samples[0].rays.as_ref().unwrap();
     let first = surface(&rays[0]);
     assert_eq!((first.found.object.as_str(), first.found.material.as_str()), ("left mirror", "mirror"));
@@ -281,7 +283,7 @@ fn a_mirror_shows_a_reflected_ray_until_the_depth_ends() {
     assert!(rays.len() > 2 && last.depth == rays.len() as u32 - 1, "each mirror sends one ray on");
 
     scene.film.max_depth = 0;
-    let explanation = all(&build(scene), 300, 100);
+    let explanation = all(&build(scene), 250, 260);
     let rays = explanation.samples[0].rays.as_ref().unwrap();
     let ended = Term::Seen { way: Way::Reflected, weight: kr, ray: None, added: Rgb::ZERO };
     assert_eq!((rays.len(), branch(surface(&rays[0]))), (1, Some(ended)));
@@ -352,6 +354,8 @@ fn holes_are_passed_by_eyes_and_by_light() {
     let square = |z: f32| rectangle(Vec3::new(-1.0, -1.0, z), Vec3::X * 2.0, Vec3::Y * 2.0);
     add_mesh(&mut scene, square(2.0), DAffine3::IDENTITY, masked);
     add_light(&mut scene, DVec3::new(0.25, 0.5, 4.0), Rgb::ONE);
+    // Beside the diagonal between the square's triangles.
+    look(&mut scene, DVec3::new(0.3, 0.1, 5.0), DVec3::new(0.3, 0.1, 0.0));
     let rays = rays(&scene);
     assert_eq!(rays[0].holes.len(), 1);
     assert_eq!((rays[0].holes[0].instance, rays[0].holes[0].t), (1, 3.0));

@@ -41,8 +41,8 @@ fn json_of(workshop: &Workshop, arguments: &str) -> Value {
 #[test]
 fn json_is_the_librarys_explanation_to_the_bit() {
     let workshop = workshop();
-    let expected = explained(&workshop, 20, 14);
-    let mut found = json_of(&workshop, "explain scene.toml --pixel 20,14 --json");
+    let expected = explained(&workshop, 20, 17);
+    let mut found = json_of(&workshop, "explain scene.toml --pixel 20,17 --json");
     let document = found.as_object_mut().unwrap();
     assert_eq!(document.remove("schema"), Some(json!(1)));
     assert_eq!(document.remove("version"), Some(json!(env!("CARGO_PKG_VERSION"))));
@@ -65,7 +65,7 @@ fn json_is_the_librarys_explanation_to_the_bit() {
 #[test]
 fn every_key_of_the_json_is_in_the_manual() {
     let workshop = workshop();
-    let json = json_of(&workshop, "explain scene.toml --pixel 20,14 --json");
+    let json = json_of(&workshop, "explain scene.toml --pixel 20,17 --json");
     let film = ["width", "height", "samples", "max_depth", "clamp", "transfer", "exposure"];
     let film: Vec<String> = film.iter().map(|key| format!("film.{key}")).collect();
     let top = ["schema", "version", "input", "camera", "film", "x", "y", "color", "alpha", "samples"];
@@ -132,13 +132,13 @@ fn inner_head(mut inner: impl Iterator<Item = String>) -> String {
 #[test]
 fn text_tells_the_first_sample_in_full_and_the_colours_of_all() {
     let workshop = workshop();
-    let expected = explained(&workshop, 20, 14);
-    let told = text(&workshop.succeed("explain scene.toml --pixel 20,14"));
+    let expected = explained(&workshop, 20, 17);
+    let told = text(&workshop.succeed("explain scene.toml --pixel 20,17"));
     let all_digits = |color: whitted::scene::Rgb| {
         let [r, g, b] = color.to_array();
         if r == g && g == b { format!("{r:?}") } else { format!("{r:?} {g:?} {b:?}") }
     };
-    assert!(told.starts_with(&format!("pixel 20,14 of 40x30: {}\n", all_digits(expected.color))), "{told}");
+    assert!(told.starts_with(&format!("pixel 20,17 of 40x30: {}\n", all_digits(expected.color))), "{told}");
     for sample in &expected.samples {
         let line = format!("{:5}  {}", sample.number, all_digits(sample.color));
         assert!(told.lines().any(|found| found == line), "`{line}` is missing:\n{told}");
@@ -153,16 +153,17 @@ fn text_tells_the_first_sample_in_full_and_the_colours_of_all() {
         "light 1 `below`: behind the surface, N.L -",
         "ray 1, reflected: kr 0.1 * ",
         "refracted: kt 0.8 * ",
-        "`core` (instance 1, primitive 0)",
-        "blocked by `core`",
+        "hits `core` (instance 1, primitive 0), material `red`",
+        "blocked by `core` (instance 1, primitive 0) at a distance of ",
+        "through `ball` (instance 0, primitive 0) at t = ",
         "left after",
     ] {
         assert!(told.contains(part), "`{part}` is missing:\n{told}");
     }
-    let third = text(&workshop.succeed("explain scene.toml --pixel 20,14 --sample 3"));
+    let third = text(&workshop.succeed("explain scene.toml --pixel 20,17 --sample 3"));
     assert!(third.contains("\nsample 3 at") && !third.contains("\nsample 0 at"), "{third}");
     // At depth 0 the branches say that they end.
-    let shallow = text(&workshop.succeed("explain scene.toml --pixel 20,14 --max-depth 0 --spp 1"));
+    let shallow = text(&workshop.succeed("explain scene.toml --pixel 20,17 --max-depth 0 --spp 1"));
     assert!(shallow.contains("refracted: kt 0.8, not followed") && !shallow.contains("ray 1"), "{shallow}");
 }
 
@@ -176,7 +177,7 @@ fn the_flags_of_render_choose_what_is_explained() {
     assert_eq!(json["camera"], "command line");
     assert!(json["samples"][0]["rays"].is_null() && json["samples"][1]["rays"].is_array());
     // A model alone has its automatic camera and lights.
-    let told = text(&workshop.succeed("explain model.obj --pixel 20,20 --size 40x30 --spp 1"));
+    let told = text(&workshop.succeed("explain model.obj --pixel 20,15 --size 40x30 --spp 1"));
     assert!(told.contains("material `floor`") && told.contains("light 0 `key`"), "{told}");
 }
 

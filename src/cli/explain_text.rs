@@ -15,7 +15,7 @@ use crate::render::explain::{
 use crate::scene::Rgb;
 
 /// Width of the column of what is added: three values with all their digits.
-const VALUES: usize = 32;
+const VALUES: usize = 35;
 
 /// Samples whose colours are listed.
 const MOST_SAMPLES: usize = 64;
