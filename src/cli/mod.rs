@@ -13,6 +13,8 @@ mod commit;
 mod completions;
 mod diff;
 mod doctor;
+mod explain;
+mod explain_text;
 mod info;
 mod info_text;
 mod ledger;
@@ -59,6 +61,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         Command::Diff(arguments) => diff::run(arguments),
         Command::Check(arguments) => check::run(arguments),
         Command::Query(arguments) => query::run(arguments),
+        Command::Explain(arguments) => explain::run(arguments),
         Command::Report(arguments) => report::run(arguments),
         Command::Bench(arguments) => bench::run(arguments),
         Command::Completions { shell } => completions::run(*shell),

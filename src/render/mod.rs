@@ -11,6 +11,7 @@
 pub mod answers;
 mod chunk;
 mod detail;
+pub mod explain;
 pub mod film;
 pub mod intersect;
 mod points;
@@ -25,6 +26,7 @@ pub mod surface;
 pub mod trace;
 mod two_level_batch;
 mod wave;
+mod witness;
 pub mod world;
 
 pub use answers::Answers;

@@ -6,6 +6,7 @@ use crate::accel::{Bvh2, Compact, CwBvh, Linear, Params, Tests, Wide};
 use crate::error::Result;
 use crate::geometry::{Hit, Key, Ray};
 use crate::progress::Progress;
+use crate::render::explain::{self, Explanation, Samples};
 use crate::render::film::Film;
 use crate::render::intersect::{Intersect, TwoLevel};
 use crate::render::ray_tracing::{Tile, ray_tracing};
@@ -201,6 +202,17 @@ impl Renderer {
     ) -> Result<Film> {
         with_structure!(&self.intersect, structure => {
             ray_tracing(&self.scene, structure.world(), structure, settings, progress, finished)
+        })
+    }
+
+    /// Tells how one pixel of the picture gets its colour: column and row from the top left.
+    ///
+    /// # Errors
+    /// A pixel outside the picture, a sample that it does not have, more than [`explain::MOST_RECORDS`] to tell, a degenerate
+    /// camera, or a cancellation.
+    pub fn explain(&self, x: u32, y: u32, samples: Samples, progress: &dyn Progress) -> Result<Explanation> {
+        with_structure!(&self.intersect, structure => {
+            explain::explain(&self.scene, structure.world(), structure, (x, y), samples, progress)
         })
     }
 
