@@ -8,6 +8,7 @@ use clap_complete::Shell;
 use super::bench::BenchArguments;
 use super::check::CheckArguments;
 use super::diff::DiffArguments;
+use super::edit::EditArguments;
 use super::explain::ExplainArguments;
 use super::memory_limit::kind_within;
 use super::precision::Precision;
@@ -53,6 +54,8 @@ pub enum Command {
     Report(ReportArguments),
     /// Compare acceleration structures, and Embree, on the same rays: which suits this model?
     Bench(Box<BenchArguments>),
+    /// Edit a scene or a model in a window, and render it there. Needs a build with the feature `editor`.
+    Edit(Box<EditArguments>),
     /// Print a shell's completion script to standard output.
     Completions {
         /// The shell.

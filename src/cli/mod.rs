@@ -13,6 +13,7 @@ mod commit;
 mod completions;
 mod diff;
 mod doctor;
+mod edit;
 mod explain;
 mod explain_text;
 mod info;
@@ -64,6 +65,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         Command::Explain(arguments) => explain::run(arguments),
         Command::Report(arguments) => report::run(arguments),
         Command::Bench(arguments) => bench::run(arguments),
+        Command::Edit(arguments) => edit::run(arguments),
         Command::Completions { shell } => completions::run(*shell),
     }
 }

@@ -12,10 +12,12 @@ pub mod item;
 pub mod job;
 pub mod navigate;
 pub mod placement;
+pub mod presets;
 pub mod session;
 #[cfg(test)]
 mod tests;
 pub mod viewport;
+pub mod window;
 
 pub use command::Command;
 pub use item::{Item, Kind};

@@ -51,6 +51,8 @@ pub struct Session {
     saved: Arc<str>,
     /// Counts the changes of the scene.
     revision: u64,
+    /// The camera that is looked through, as long as it is there.
+    active_camera: usize,
 }
 
 impl Session {
@@ -94,7 +96,7 @@ impl Session {
         progress: &dyn Progress,
     ) -> Result<Self> {
         let mut assets = Assets::default();
-        let reading = read(text, &place, &options, &mut assets, progress)?;
+        let reading = read(text, &place, &options, 0, &mut assets, progress)?;
         let document = Document::parse(text).map_err(|error| error.at_path(&place))?;
         let text: Arc<str> = Arc::from(text);
         Ok(Self {
@@ -109,6 +111,7 @@ impl Session {
             selection: BTreeSet::new(),
             history: History::default(),
             revision: 0,
+            active_camera: 0,
         })
     }
 
@@ -145,6 +148,25 @@ impl Session {
     /// A number that changes whenever the scene does.
     pub fn revision(&self) -> u64 {
         self.revision
+    }
+
+    /// Counts changes from another number on.
+    pub fn begin_at(&mut self, revision: u64) {
+        self.revision = revision;
+    }
+
+    /// Looks through another of the scene's cameras, until it is opened again. Nothing of the text changes.
+    ///
+    /// # Errors
+    /// A camera that is not there.
+    pub fn choose_camera(&mut self, index: usize) -> Result<()> {
+        if index >= self.reading.scene.cameras.len() {
+            return Err(Error::caller(format!("there is no camera {}", index + 1)));
+        }
+        self.active_camera = index;
+        Arc::make_mut(&mut self.reading.scene).active_camera = index;
+        self.revision += 1;
+        Ok(())
     }
 
     /// Whether there is something to save.
@@ -215,7 +237,7 @@ impl Session {
         if before.is_none() && *text == *self.text {
             return Ok(());
         }
-        let reading = read(&text, &self.place, &self.options, &mut self.assets, &Silent)?;
+        let reading = read(&text, &self.place, &self.options, self.active_camera, &mut self.assets, &Silent)?;
         let state = self.state();
         if before.is_none() {
             self.history.push(state, command.label(), movement);
@@ -291,7 +313,7 @@ impl Session {
     }
 
     fn read_state(&mut self, state: &State) -> Result<(Document, Reading)> {
-        let reading = read(&state.text, &self.place, &self.options, &mut self.assets, &Silent)?;
+        let reading = read(&state.text, &self.place, &self.options, self.active_camera, &mut self.assets, &Silent)?;
         Ok((Document::parse(&state.text)?, reading))
     }
 
@@ -404,7 +426,7 @@ impl Session {
         };
         let document = rebased(&self.text)?;
         let text = document.text();
-        let reading = read(&text, to, &self.options, &mut self.assets, &Silent)?;
+        let reading = read(&text, to, &self.options, self.active_camera, &mut self.assets, &Silent)?;
         self.history.each(|text| rebased(text).map(|document| Arc::from(document.text())))?;
         self.document = document;
         self.text = Arc::from(text);
@@ -417,17 +439,9 @@ impl Session {
         write_atomically(path, |sink| sink.write_all(text).map_err(|cause| Error::system(path, cause)))
     }
 
-    /// Reads a model so that adding it to the scene takes no time.
-    ///
-    /// # Errors
-    /// Those of reading it.
-    pub fn preload(&mut self, path: &Path, progress: &dyn Progress) -> Result<()> {
-        self.assets.model(path, &self.options, progress).map(drop)
-    }
-
-    /// What was read of other files, for reading more elsewhere.
-    pub fn assets_mut(&mut self) -> &mut Assets {
-        &mut self.assets
+    /// Takes over models that were read elsewhere, so that adding them to the scene takes no time.
+    pub fn adopt(&mut self, assets: Assets) {
+        self.assets.adopt(assets);
     }
 
     /// How models are read.
@@ -463,6 +477,7 @@ fn read(
     text: &str,
     place: &Path,
     options: &LoadOptions,
+    camera: usize,
     assets: &mut Assets,
     progress: &dyn Progress,
 ) -> Result<Reading> {
@@ -470,6 +485,7 @@ fn read(
         parse_with(text, place, options, assets, progress)?;
     let mut scene = loaded.scene;
     scene.origin = origin::choose(&scene);
+    scene.active_camera = if camera < scene.cameras.len() { camera } else { 0 };
     Ok(Reading {
         scene: Arc::new(scene),
         entries,

@@ -329,6 +329,11 @@ impl Quadric {
         }
     }
 
+    /// How texture coordinates lie on it.
+    pub fn mapping(&self) -> Mapping {
+        self.mapping
+    }
+
     /// The value of F at a point of object space, up to a positive factor.
     pub fn value(&self, p: DVec3) -> f64 {
         self.form.value(p)

@@ -7,8 +7,8 @@ use crate::math::vector::{cross, dot, normalize};
 use crate::scene::{Camera, Projection};
 
 /// The nearest that is seen, as a share of the farthest: a depth buffer of 24 bits then tells apart what differs by a
-/// 1700th of its distance where it is farthest, and by less where it is near.
-const NEAREST_SHARE: f64 = 1e-4;
+/// 300th of its distance where it is farthest, and by ever less towards the eye.
+const NEAREST_SHARE: f64 = 2e-5;
 
 /// A camera and the size of its picture in pixels, in the file's coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]

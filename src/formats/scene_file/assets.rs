@@ -74,6 +74,17 @@ impl Assets {
         self.reading += 1;
     }
 
+    /// Takes over what was read elsewhere.
+    pub fn adopt(&mut self, other: Self) {
+        // Files are looked at again at the next reading.
+        let unseen = u64::MAX;
+        self.images.extend(other.images.into_iter().map(|(key, kept)| (key, Kept { looked_at: unseen, ..kept })));
+        for (key, kept) in other.models {
+            self.models.retain(|(known, _)| *known != key);
+            self.models.push((key, Kept { looked_at: unseen, ..kept }));
+        }
+    }
+
     /// An image.
     ///
     /// # Errors

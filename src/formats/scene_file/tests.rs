@@ -45,7 +45,7 @@ const MISTAKES: &[(&str, &str)] = &[
     ),
     (
         "[[object]]\nsphere = {}\nnormals = \"flat\"",
-        "3:1: unknown key `normals` of an object; accepted are `sphere`, `name`, `material`, `transform`, `instances`",
+        "3:1: unknown key `normals` of an object; accepted are `sphere`, `name`, `material`, `transform`, `instances`, `visible`",
     ),
     ("[camera]\neye = [0, 0, 1]", "1:1: a camera needs `target`"),
     ("\n\n[[light]]\nposition = [0, 0, 0]", "3:1: a light needs `kind`"),

@@ -1,0 +1,479 @@
+//! Draws a scene's pieces, its background and the lines over it into a picture.
+
+use std::collections::HashMap;
+use std::ops::Range;
+use std::sync::Arc;
+
+use glam::{DMat4, DVec2, DVec3, DVec4, Mat4, Vec3, Vec4};
+
+use crate::editor::viewport::camera::{Eye, View};
+use crate::editor::viewport::gl::{Attribute, Format, Geometry, Gl, Image, Mode, Program, Shape, Value};
+use crate::editor::viewport::images::{Images, placing};
+use crate::editor::viewport::lines::{LineVertex, Lines};
+use crate::editor::viewport::piece::{Cluster, Piece};
+use crate::editor::viewport::preview::{Drawing, Placed, Shown};
+use crate::editor::viewport::terms::{Lights, Terms};
+use crate::error::Result;
+use crate::math::transform::Transform;
+use crate::math::vector::{dot, length};
+use crate::scene::{Background, Rgb, Scene, Transfer};
+
+const INPUTS: [&str; 4] = ["position", "normal", "uvs", "color"];
+const LINE_INPUTS: [&str; 4] = ["position", "other", "side", "color"];
+
+/// So many triangles are drawn while the camera moves, where there are more.
+pub const MOVING_TRIANGLES: usize = 80_000;
+
+/// A piece on the graphics card.
+struct Uploaded {
+    /// Keeps the piece, and so its address, as long as this.
+    _shown: Arc<Shown>,
+    geometry: Geometry,
+    edges: Option<Geometry>,
+    is_used: bool,
+}
+
+/// Programs, and what is on the graphics card of the scene drawn last.
+pub struct Painter {
+    surface: Program,
+    sky: Program,
+    line: Program,
+    copy: Program,
+    /// No values at all, for what the shader makes of vertices' numbers.
+    nothing: Geometry,
+    pieces: HashMap<(usize, bool), Uploaded>,
+    images: Images,
+}
+
+/// What stays the same throughout a picture.
+pub struct Frame<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// What of it is drawn.
+    pub drawing: &'a Drawing,
+    /// The terms of its materials.
+    pub terms: &'a [Terms],
+    /// Its lights, relative to `origin`.
+    pub lights: &'a Lights,
+    /// Where shaders' coordinates are relative to.
+    pub origin: DVec3,
+    /// Where it is seen from.
+    pub view: &'a View,
+    /// Whether stand-ins are drawn.
+    pub moving: bool,
+    /// Whether edges alone are drawn.
+    pub wireframe: bool,
+}
+
+/// The clusters of one material of one object.
+struct Batch<'a> {
+    placed: &'a Placed,
+    piece: &'a Piece,
+    is_stand_in: bool,
+    material: u32,
+    parts: Vec<Range<u32>>,
+    depth: f64,
+}
+
+impl Painter {
+    /// Compiles the shaders.
+    ///
+    /// # Errors
+    /// What the driver does not support.
+    pub fn new(gl: &Gl) -> Result<Self> {
+        let encode = include_str!("shaders/encode.glsl");
+        let with_encode = |source: &str| format!("{encode}{source}");
+        let sky = include_str!("shaders/sky.vert");
+        Ok(Self {
+            surface: gl.program(
+                include_str!("shaders/surface.vert"),
+                &with_encode(include_str!("shaders/surface.frag")),
+                &INPUTS,
+            )?,
+            sky: gl.program(sky, &with_encode(include_str!("shaders/sky.frag")), &[])?,
+            line: gl.program(include_str!("shaders/line.vert"), include_str!("shaders/line.frag"), &LINE_INPUTS)?,
+            copy: gl.program(sky, include_str!("shaders/copy.frag"), &[])?,
+            nothing: gl.geometry(&[], &[])?,
+            pieces: HashMap::new(),
+            images: Images::default(),
+        })
+    }
+
+    /// Draws the background over the whole picture.
+    ///
+    /// # Errors
+    /// A limit where there is no room for its image.
+    pub fn sky(&mut self, gl: &Gl, frame: &Frame<'_>) -> Result<()> {
+        let (bottom, top, up) = sky_colors(&frame.scene.background);
+        let image = match &frame.scene.background {
+            Background::Image { texture, .. } => Some(self.images.of(gl, texture)?),
+            _ => None,
+        };
+        let bottom = match &frame.scene.background {
+            Background::Image { intensity, .. } => Rgb::splat(*intensity),
+            _ => bottom,
+        };
+        let (width, height) = frame.view.size();
+        let direction = |x: f64, y: f64| frame.view.ray(DVec2::new(x, y)).1;
+        let corner = direction(0.0, 0.0);
+        let set = |name: &str, value: Value<'_>| gl.set(&self.sky, name, value);
+        gl.use_program(&self.sky);
+        // Of any length, but all together of one that f32 holds.
+        let unit = 1.0 / length(corner).max(f64::MIN_POSITIVE);
+        set("corner_direction", Value::Vec3((corner * unit).as_vec3()));
+        set("step_x", Value::Vec3(((direction(width, 0.0) - corner) * unit).as_vec3()));
+        set("step_y", Value::Vec3(((direction(0.0, height) - corner) * unit).as_vec3()));
+        set("sky_bottom", Value::Vec3(bottom));
+        set("sky_top", Value::Vec3(top));
+        set("sky_up", Value::Vec3(up));
+        set("image", Value::Int(0));
+        set("has_image", Value::Int(i32::from(image.is_some())));
+        self.set_film(gl, frame.scene, &self.sky);
+        gl.bind_image(0, image);
+        gl.set_mode(Mode { tests_depth: false, writes_depth: false, blends: false, culls: None });
+        gl.draw_all(&self.nothing, 3);
+        Ok(())
+    }
+
+    /// Draws all pieces, those that hide what is behind first; says how many triangles were drawn.
+    ///
+    /// # Errors
+    /// A limit where there is no room.
+    pub fn surfaces(&mut self, gl: &Gl, frame: &Frame<'_>) -> Result<u64> {
+        gl.use_program(&self.surface);
+        self.set_frame(gl, frame);
+        let mut batches = batches(frame);
+        // What hides others from the nearest on, the rest from the farthest on.
+        let is_blended = |batch: &Batch<'_>| frame.terms[batch.material as usize].is_blended;
+        batches.sort_by(|a, b| {
+            let order = a.depth.total_cmp(&b.depth);
+            is_blended(a).cmp(&is_blended(b)).then(if is_blended(a) { order.reverse() } else { order })
+        });
+        let mut triangles = 0;
+        for batch in &batches {
+            triangles += batch.parts.iter().map(|part| u64::from(part.end - part.start) / 3).sum::<u64>();
+            self.batch(gl, frame, batch)?;
+        }
+        Ok(triangles)
+    }
+
+    fn batch(&mut self, gl: &Gl, frame: &Frame<'_>, batch: &Batch<'_>) -> Result<()> {
+        let terms = &frame.terms[batch.material as usize];
+        let texture = |painter: &mut Self, reference: Option<&crate::scene::TextureRef>| -> Result<Option<Image>> {
+            let texture = reference.map(|reference| &frame.scene.textures[reference.texture as usize]);
+            texture.map(|texture| painter.images.of(gl, texture)).transpose()
+        };
+        let (image, glow) = (texture(self, terms.texture.as_ref())?, texture(self, terms.glow_texture.as_ref())?);
+        gl.bind_image(0, image);
+        gl.bind_image(1, glow);
+        self.upload(gl, batch, frame.wireframe)?;
+
+        let set = |name: &str, value: Value<'_>| gl.set(&self.surface, name, value);
+        let transform = &batch.placed.transform;
+        set("to_clip", Value::Mat4(rows_matrix(clip_rows(frame.view, transform))));
+        let m = transform.to_world();
+        let columns = [m.matrix3.x_axis, m.matrix3.y_axis, m.matrix3.z_axis].map(|axis| axis.extend(0.0).as_vec4());
+        let [x, y, z] = columns;
+        let place = (m.translation - frame.origin).as_vec3().extend(1.0);
+        set("to_world", Value::Mat4(Mat4::from_cols(x, y, z, place)));
+        set("normal_to_world", Value::Mat4(normal_matrix(transform)));
+        set("tinted", Value::Vec3(terms.tinted));
+        set("diffuse", Value::Vec3(terms.diffuse));
+        set("steady", Value::Vec3(terms.steady));
+        set("shine", Value::Vec4(terms.shine.extend(terms.exponent)));
+        set("mirror", Value::Vec3(terms.mirror));
+        set("glow", Value::Vec3(terms.glow));
+        set("alpha", Value::Vec3(Vec3::new(terms.alpha, terms.cutoff, if terms.has_alpha { 1.0 } else { 0.0 })));
+        set("has_image", Value::Int(i32::from(image.is_some())));
+        set("has_glow_image", Value::Int(i32::from(glow.is_some())));
+        let ((matrix, offset), (glow_matrix, glow_offset)) =
+            (placing(terms.texture.as_ref()), placing(terms.glow_texture.as_ref()));
+        set("uv_matrix", Value::Vec4(matrix));
+        set("uv_offset", Value::Vec4(offset));
+        set("glow_matrix", Value::Vec4(glow_matrix));
+        set("glow_offset", Value::Vec4(glow_offset));
+
+        gl.set_mode(Mode {
+            tests_depth: true,
+            writes_depth: !terms.is_blended,
+            blends: terms.is_blended,
+            culls: terms.single_sided.then(|| !transform.is_mirroring()),
+        });
+        // What a geometry lacks: coordinates of 0 and white.
+        gl.set_default(2, Vec4::ZERO);
+        gl.set_default(3, Vec4::ONE);
+        let Some(uploaded) = self.pieces.get(&key(batch)) else { return Ok(()) };
+        match &uploaded.edges {
+            Some(edges) if frame.wireframe => gl.draw(edges, Shape::Lines, &[0..u32::MAX]),
+            _ => gl.draw(&uploaded.geometry, Shape::Triangles, &batch.parts),
+        }
+        Ok(())
+    }
+
+    fn upload(&mut self, gl: &Gl, batch: &Batch<'_>, wireframe: bool) -> Result<()> {
+        let piece = batch.piece;
+        let key = key(batch);
+        if !self.pieces.contains_key(&key) {
+            let geometry = geometry(gl, piece, &piece.indices)?;
+            let uploaded = Uploaded { _shown: batch.placed.shown.clone(), geometry, edges: None, is_used: true };
+            self.pieces.insert(key, uploaded);
+        }
+        if let Some(uploaded) = self.pieces.get_mut(&key)
+            && uploaded.edges.is_none()
+            && wireframe
+        {
+            uploaded.edges = Some(geometry(gl, piece, &edges(piece))?);
+        }
+        Ok(())
+    }
+
+    /// Draws lines, which start at `frame.origin`; those behind something with a share of their opacity.
+    ///
+    /// # Errors
+    /// A limit where there is no room.
+    pub fn lines(&self, gl: &Gl, frame: &Frame<'_>, lines: &Lines, width: f32, hidden: f32) -> Result<()> {
+        if lines.vertices.is_empty() {
+            return Ok(());
+        }
+        let fields = [
+            (0, Format::Floats(3), 0),
+            (1, Format::Floats(3), 12),
+            (2, Format::Floats(1), 24),
+            (3, Format::Floats(4), 28),
+        ];
+        let stride = size_of::<LineVertex>() as i32;
+        let attribute = Attribute { bytes: bytemuck::cast_slice(&lines.vertices), fields: &fields, stride };
+        let geometry = gl.geometry(&[attribute], &[])?;
+        gl.use_program(&self.line);
+        let (x, y) = frame.view.size();
+        gl.set(&self.line, "to_clip", Value::Mat4(frame.view.matrix(frame.origin)));
+        gl.set(&self.line, "picture", Value::Vec3(Vec3::new(x as f32, y as f32, 0.5 * width)));
+        for (tests_depth, opacity) in [(false, hidden), (true, 1.0)] {
+            if opacity > 0.0 {
+                gl.set(&self.line, "opacity", Value::Float(opacity));
+                gl.set_mode(Mode { tests_depth, writes_depth: false, blends: true, culls: None });
+                gl.draw_all(&geometry, lines.vertices.len() as u32);
+            }
+        }
+        gl.delete_geometry(geometry);
+        Ok(())
+    }
+
+    /// Copies an image to the bound framebuffer, into this part of it: left, bottom, width and height in pixels.
+    pub fn copy(&self, gl: &Gl, image: Image, part: [i32; 4]) {
+        gl.use_program(&self.copy);
+        gl.set(&self.copy, "image", Value::Int(0));
+        gl.bind_image(0, Some(image));
+        gl.set_viewport(part);
+        gl.set_mode(Mode { tests_depth: false, writes_depth: false, blends: false, culls: None });
+        gl.draw_all(&self.nothing, 3);
+        gl.bind_image(0, None);
+    }
+
+    /// Forgets what the drawing does not have.
+    pub fn retain(&mut self, gl: &Gl, scene: &Scene, drawing: &Drawing) {
+        self.pieces.values_mut().for_each(|uploaded| uploaded.is_used = false);
+        for placed in &drawing.placed {
+            for is_stand_in in [false, true] {
+                if let Some(uploaded) = self.pieces.get_mut(&(Arc::as_ptr(&placed.shown) as usize, is_stand_in)) {
+                    uploaded.is_used = true;
+                }
+            }
+        }
+        let unused: Vec<_> =
+            self.pieces.iter().filter(|(_, uploaded)| !uploaded.is_used).map(|(&key, _)| key).collect();
+        unused.iter().filter_map(|key| self.pieces.remove(key)).for_each(|uploaded| uploaded.destroy(gl));
+        self.images.retain(gl, scene);
+    }
+
+    /// Frees everything.
+    pub fn destroy(mut self, gl: &Gl) {
+        self.pieces.drain().for_each(|(_, uploaded)| uploaded.destroy(gl));
+        self.images.destroy(gl);
+        gl.delete_geometry(self.nothing);
+        [self.surface, self.sky, self.line, self.copy].into_iter().for_each(|program| gl.delete_program(program));
+    }
+
+    fn set_frame(&self, gl: &Gl, frame: &Frame<'_>) {
+        let set = |name: &str, value: Value<'_>| gl.set(&self.surface, name, value);
+        let eye = match frame.view.eye() {
+            Eye::At(eye) => (eye - frame.origin).as_vec3().extend(1.0),
+            Eye::Parallel(direction) => (-direction).as_vec3().extend(0.0),
+        };
+        set("eye", Value::Vec4(eye));
+        set("light_count", Value::Int(frame.lights.places.len() as i32));
+        set("light_places", Value::Vec4s(&frame.lights.places));
+        set("light_colors", Value::Vec4s(&frame.lights.colors));
+        set("light_cones", Value::Vec4s(&frame.lights.cones));
+        set("light_rims", Value::Floats(&frame.lights.rims));
+        let (bottom, top, up) = sky_colors(&frame.scene.background);
+        set("sky_bottom", Value::Vec3(bottom));
+        set("sky_top", Value::Vec3(top));
+        set("sky_up", Value::Vec3(up));
+        set("image", Value::Int(0));
+        set("glow_image", Value::Int(1));
+        self.set_film(gl, frame.scene, &self.surface);
+    }
+
+    fn set_film(&self, gl: &Gl, scene: &Scene, program: &Program) {
+        gl.set(program, "exposure", Value::Float(libm::exp2f(scene.film.exposure)));
+        gl.set(program, "is_linear", Value::Int(i32::from(scene.film.transfer == Transfer::Linear)));
+    }
+}
+
+impl Uploaded {
+    fn destroy(self, gl: &Gl) {
+        gl.delete_geometry(self.geometry);
+        if let Some(edges) = self.edges {
+            gl.delete_geometry(edges);
+        }
+    }
+}
+
+fn key(batch: &Batch<'_>) -> (usize, bool) {
+    (Arc::as_ptr(&batch.placed.shown) as usize, batch.is_stand_in)
+}
+
+/// What is to be drawn: what the camera cannot see is left out.
+fn batches<'a>(frame: &Frame<'a>) -> Vec<Batch<'a>> {
+    let total = frame.drawing.triangle_count();
+    let mut batches: Vec<Batch<'a>> = Vec::new();
+    for placed in &frame.drawing.placed {
+        let stand_in = frame.moving.then(|| placed.shown.stand_in(total, MOVING_TRIANGLES)).flatten();
+        let piece = stand_in.unwrap_or(&placed.shown.piece);
+        let sight = Sight::of(frame.view, placed, piece);
+        let mut latest: Option<Batch<'a>> = None;
+        for cluster in &piece.clusters {
+            let material = placed.material.unwrap_or(cluster.material);
+            let hides = frame.terms[material as usize].hides();
+            if !sight.meets(cluster) || (hides && sight.is_seen_from_behind(cluster)) {
+                continue;
+            }
+            match &mut latest {
+                Some(batch) if batch.material == material => match batch.parts.last_mut() {
+                    Some(part) if part.end == cluster.indices.start => part.end = cluster.indices.end,
+                    _ => batch.parts.push(cluster.indices.clone()),
+                },
+                _ => {
+                    let depth = frame.view.depth(placed.transform.point_to_world(cluster.center.as_dvec3()));
+                    let parts = vec![cluster.indices.clone()];
+                    let is_stand_in = stand_in.is_some();
+                    batches.extend(latest.replace(Batch { placed, piece, is_stand_in, material, parts, depth }));
+                }
+            }
+        }
+        batches.extend(latest);
+    }
+    batches
+}
+
+/// What of a piece the camera may see, in the piece's own coordinates.
+struct Sight {
+    /// Unit normals into the picture and distances: left, right, lower, upper side, near.
+    planes: [DVec4; 5],
+    /// Where a closed piece is seen from outside: the eye and 1, or the direction of parallel rays and 0.
+    from: Option<(DVec3, bool)>,
+}
+
+impl Sight {
+    fn of(view: &View, placed: &Placed, piece: &Piece) -> Self {
+        let [x, y, z, w] = clip_rows(view, &placed.transform);
+        let planes = [w + x, w - x, w + y, w - y, w + z].map(|plane| {
+            let size = length(plane.truncate());
+            if size > 0.0 { plane / size } else { DVec4::W * f64::INFINITY }
+        });
+        let from = match view.eye() {
+            Eye::At(eye) => (placed.transform.point_to_object(eye), true),
+            Eye::Parallel(direction) => (placed.transform.vector_to_object(direction), false),
+        };
+        let (min, max) = (piece.bounds.0.as_dvec3(), piece.bounds.1.as_dvec3());
+        let is_within = from.1 && from.0.cmpge(min).all() && from.0.cmple(max).all();
+        Self { planes, from: (piece.is_closed && !is_within).then_some(from) }
+    }
+
+    fn meets(&self, cluster: &Cluster) -> bool {
+        let center = cluster.center.as_dvec3();
+        // Written so that NaN is seen.
+        self.planes.iter().all(|plane| !(dot(plane.truncate(), center) + plane.w < -f64::from(cluster.radius)))
+    }
+
+    /// Whether all of its faces look away.
+    fn is_seen_from_behind(&self, cluster: &Cluster) -> bool {
+        let (axis, spread) = (cluster.axis.as_dvec3(), f64::from(cluster.spread));
+        match self.from {
+            Some((eye, true)) => {
+                let offset = cluster.center.as_dvec3() - eye;
+                spread < 1.0 && dot(offset, axis) > spread * length(offset) + f64::from(cluster.radius)
+            }
+            Some((direction, false)) => spread < 1.0 && dot(direction, axis) > spread * length(direction),
+            None => false,
+        }
+    }
+}
+
+/// The rows of the matrix from a piece's vertices to clip space.
+fn clip_rows(view: &View, transform: &Transform) -> [DVec4; 4] {
+    let m = transform.to_world();
+    // The eye is near, compared with the file's zero: first the difference.
+    view.rows(m.translation).map(|row| {
+        let along = row.truncate();
+        let columns = [m.matrix3.x_axis, m.matrix3.y_axis, m.matrix3.z_axis].map(|axis| dot(along, axis));
+        DVec3::from_array(columns).extend(row.w)
+    })
+}
+
+fn rows_matrix([x, y, z, w]: [DVec4; 4]) -> Mat4 {
+    DMat4::from_cols(x, y, z, w).transpose().as_mat4()
+}
+
+/// The inverse transpose, scaled to numbers that f32 holds: normals are made unit vectors afterwards.
+fn normal_matrix(transform: &Transform) -> Mat4 {
+    let columns = DVec3::AXES.map(|axis| transform.normal_to_world(axis));
+    let largest = columns.iter().map(|column| column.abs().max_element()).fold(f64::MIN_POSITIVE, f64::max);
+    let [x, y, z] = columns.map(|column| (column / largest).as_vec3().extend(0.0));
+    Mat4::from_cols(x, y, z, Vec4::W)
+}
+
+/// The colours straight down and straight up, and which way that is; what mirrors show of the background.
+fn sky_colors(background: &Background) -> (Rgb, Rgb, Vec3) {
+    match background {
+        Background::Color(color) => (*color, *color, Vec3::Y),
+        Background::Gradient { bottom, top, up } => (*bottom, *top, up.as_vec3()),
+        Background::Image { texture, intensity } => {
+            let at = |v: f64| texture.sample_footprint(DVec2::new(0.5, v), f32::MAX).truncate() * *intensity;
+            (at(0.25), at(0.75), Vec3::Y)
+        }
+        Background::Transparent => (Rgb::ZERO, Rgb::ZERO, Vec3::Y),
+    }
+}
+
+fn geometry(gl: &Gl, piece: &Piece, indices: &[u32]) -> Result<Geometry> {
+    let vertices = Attribute {
+        bytes: bytemuck::cast_slice(&piece.vertices),
+        fields: &[(0, Format::Floats(3), 0), (1, Format::Packed, 12)],
+        stride: 16,
+    };
+    let mut attributes = vec![vertices];
+    if let Some(uvs) = &piece.uvs {
+        let fields = &[(2, Format::Floats(4), 0)];
+        attributes.push(Attribute { bytes: bytemuck::cast_slice(uvs), fields, stride: 16 });
+    }
+    if let Some(colors) = &piece.colors {
+        let fields = &[(3, Format::Fractions, 0)];
+        attributes.push(Attribute { bytes: bytemuck::cast_slice(colors), fields, stride: 8 });
+    }
+    gl.geometry(&attributes, indices)
+}
+
+/// The edges of a piece's triangles, each once for each cluster.
+fn edges(piece: &Piece) -> Vec<u32> {
+    let mut edges: Vec<[u32; 2]> = piece
+        .indices
+        .chunks_exact(3)
+        .flat_map(|corners| (0..3).map(|k| [corners[k], corners[(k + 1) % 3]]))
+        .map(|[a, b]| [a.min(b), a.max(b)])
+        .collect();
+    edges.sort_unstable();
+    edges.dedup();
+    edges.concat()
+}

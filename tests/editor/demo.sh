@@ -1,0 +1,97 @@
+#!/usr/bin/env bash
+# The seed's demo in the editor's real window, on a screen that nobody sees, with software OpenGL.
+#
+# usage: tests/editor/demo.sh PROGRAM FOLDER [short]
+#
+# Drives PROGRAM (`whitted` built with the feature `editor`) by keys and clicks, leaves a screenshot of each step in FOLDER, and fails if
+# the scene that is saved, or the picture of it, is not as it should be. `short` opens, selects, renders and closes.
+set -euo pipefail
+program=$(realpath "${1:?usage: tests/editor/demo.sh PROGRAM FOLDER [short]}")
+mkdir -p "${2:?usage: tests/editor/demo.sh PROGRAM FOLDER [short]}"
+folder=$(realpath "$2")
+short=${3:-}
+root=$(cd "$(dirname "$0")/../.." && pwd)
+
+need() { command -v "$1" >/dev/null || missing="${missing:-} $2"; }
+need Xvfb xvfb
+need xdotool xdotool
+need import imagemagick
+[ -n "$(ls /usr/lib/*/dri/*swrast*_dri.so /usr/lib/*/libgallium*.so 2>/dev/null)" ] || missing="${missing:-} libgl1-mesa-dri"
+[ -n "$(ls /usr/lib/*/libEGL.so.1 2>/dev/null)" ] || missing="${missing:-} libegl1 libgl1"
+for library in libX11.so.6:libx11-6 libXcursor.so.1:libxcursor1 libXi.so.6:libxi6 libXrandr.so.2:libxrandr2 \
+    libxkbcommon-x11.so.0:libxkbcommon-x11-0; do
+    [ -n "$(ls /usr/lib/*/"${library%%:*}" 2>/dev/null)" ] || missing="${missing:-} ${library##*:}"
+done
+if [ -n "${missing:-}" ]; then
+    apt-get update -q
+    # shellcheck disable=SC2086
+    apt-get install -q -y --no-install-recommends $missing
+fi
+
+rm -f "$folder"/*.png "$folder"/*.toml "$folder"/*.err
+export XDG_DATA_HOME="$folder/data" LIBGL_ALWAYS_SOFTWARE=1 WINIT_X11_SCALE_FACTOR=1
+rm -rf "$XDG_DATA_HOME"
+unset WAYLAND_DISPLAY
+exec 9< <(exec Xvfb -displayfd 1 -screen 0 1280x800x24 2>/dev/null)
+server=$!
+read -r -u 9 number
+export DISPLAY=":$number"
+editor=
+trap 'kill $editor $server 2>/dev/null || true' EXIT
+
+start() {
+    "$program" edit "$@" 2>"$folder/editor.err" &
+    editor=$!
+    for _ in $(seq 300); do
+        window=$(xdotool search --pid $editor 2>/dev/null | tail -1 || true)
+        [ -n "$window" ] && xdotool getwindowname "$window" 2>/dev/null | grep -q whitted && break
+        kill -0 $editor || { cat "$folder/editor.err"; exit 1; }
+        sleep 0.1
+    done
+    xdotool windowmove "$window" 0 0 windowsize "$window" 1280 800
+    xdotool windowfocus "$window"
+    sleep 1.5
+}
+key() { for k in "$@"; do xdotool key "$k"; sleep 0.25; done; }
+click() { xdotool mousemove "$1" "$2"; sleep 0.15; xdotool click 1; sleep 0.35; }
+drag() {
+    xdotool mousemove "$1" "$2"; sleep 0.1; xdotool mousedown 1
+    for step in 1 2 3 4 5 6 7 8; do
+        xdotool mousemove $(($1 + ($3 - $1) * step / 8)) $(($2 + ($4 - $2) * step / 8)); sleep 0.06
+    done
+    xdotool mouseup 1; sleep 0.4
+}
+type_path() { sleep 0.4; key ctrl+a; xdotool type --delay 8 "$1"; sleep 0.3; key Return; sleep 0.8; }
+shot() { import -window root "$folder/$1.png"; }
+title() { xdotool getwindowname "$window"; }
+# Until the picture is finished its file cannot be saved.
+save_picture() {
+    rm -f "$1"
+    for _ in $(seq 120); do
+        sleep 0.5
+        key ctrl+p
+        type_path "$1"
+        [ -s "$1" ] && return
+        key Escape
+    done
+    echo "no picture was saved as $1"; exit 1
+}
+expect() { grep -q -- "$1" "$2" || { echo "$2 has no \`$1\`:"; cat "$2"; exit 1; }; }
+
+if [ "$short" = short ]; then
+    start "$root/scenes/mirrors.toml"
+    click 600 430
+    shot short-1-selected
+    key F5
+    save_picture "$folder/short.png.tmp.png"
+    shot short-2-rendered
+    "$program" render --quiet "$root/scenes/mirrors.toml" -o "$folder/expected.tmp.png"
+    cmp "$folder/short.png.tmp.png" "$folder/expected.tmp.png"
+    key ctrl+q
+    for _ in $(seq 50); do kill -0 $editor 2>/dev/null || break; sleep 0.1; done
+    ! kill -0 $editor 2>/dev/null || { echo 'the editor did not close'; exit 1; }
+    wait $editor
+    echo 'the short demo passed'
+    exit 0
+fi
+echo 'step by step'
