@@ -94,4 +94,62 @@ if [ "$short" = short ]; then
     echo 'the short demo passed'
     exit 0
 fi
-echo 'step by step'
+scene="$folder/demo.toml"
+start
+shot 01-start
+# Menus are found by where they are in a window of 1280 x 800: Add, and its first and twelfth lines.
+click 88 12; shot 02-add; click 104 39; shot 03-sphere
+# Presets are buttons beside each other under the material: gold.
+click 1183 268; shot 04-gold
+key w; drag 585 404 585 360; shot 05-moved
+click 88 12; click 114 324; shot 06-light
+# The light's colour: the button, and a place in the field of colours that it opens.
+click 1070 86; shot 07-colour-picker
+click 1130 190; key Escape; shot 08-colour
+# The sphere again, and an image for it.
+click 70 108; key t; type_path "$root/meshes/checker.png"; shot 09-texture
+key Left Left; shot 10-turned
+key F5; sleep 1; shot 11-rendering
+save_picture "$folder/full.tmp.png"; shot 12-rendered
+key ctrl+s; type_path "$scene"; shot 13-saved
+"$program" render --quiet "$scene" -o "$folder/expected.tmp.png"
+cmp "$folder/full.tmp.png" "$folder/expected.tmp.png"
+expect 'name = "gold"' "$scene"
+expect 'kind = "point"' "$scene"
+expect 'checker.png' "$scene"
+[ "$(grep -c '^\[\[light\]\]' "$scene")" = 2 ] || { echo 'no second light'; exit 1; }
+! grep -q 'color = \[0.6, 0.6, 0.6\]' "$scene" || { echo 'the light has the colour it began with'; exit 1; }
+# A region of the picture, dragged.
+key F7 F6; drag 450 330 700 500; sleep 2
+save_picture "$folder/region.tmp.png"; shot 14-region
+python3 - "$folder/region.tmp.png" "$folder/full.tmp.png" <<'PYTHON' || { echo 'the region is no part of the picture'; exit 1; }
+import struct, sys
+def size(name):
+    data = open(name, 'rb').read(24)
+    return struct.unpack('>II', data[16:24])
+region, full = size(sys.argv[1]), size(sys.argv[2])
+sys.exit(not (0 < region[0] < full[0] and 0 < region[1] < full[1]))
+PYTHON
+# Why a pixel has its colour.
+key F7 F5; sleep 0.5; save_picture "$folder/again.tmp.png"
+cmp "$folder/again.tmp.png" "$folder/full.tmp.png"
+key F8; click 585 430; sleep 1; shot 15-explained; key Escape
+key F7 ctrl+z; shot 16-undone; key ctrl+shift+z
+key ctrl+q
+for _ in $(seq 50); do kill -0 $editor 2>/dev/null || break; sleep 0.1; done
+! kill -0 $editor 2>/dev/null || { shot not-closed; echo 'the editor did not close'; exit 1; }
+wait $editor
+start "$scene"
+shot 17-reopened
+key F5; save_picture "$folder/reopened.tmp.png"
+cmp "$folder/reopened.tmp.png" "$folder/expected.tmp.png"
+# A change that is not saved: closing asks.
+key ctrl+a Delete ctrl+q; sleep 0.5; shot 18-asked
+kill -0 $editor
+# A crash: what was not saved is offered again.
+sleep 6
+kill -9 $editor
+wait $editor 2>/dev/null || true
+start "$scene"
+shot 19-recovery
+echo 'the demo passed'

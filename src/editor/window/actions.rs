@@ -144,8 +144,8 @@ pub struct Entry {
     pub about: &'static str,
     /// The keys that call it.
     pub keys: Option<KeyboardShortcut>,
-    /// What the toolbar shows; nothing where it is not there.
-    pub icon: &'static str,
+    /// What the toolbar calls it; nothing where it is not there.
+    pub short: &'static str,
 }
 
 const NONE: Modifiers = Modifiers::NONE;
@@ -159,34 +159,41 @@ const fn entry(
     label: &'static str,
     about: &'static str,
     keys: Option<(Modifiers, Key)>,
-    icon: &'static str,
+    short: &'static str,
 ) -> Entry {
     let keys = match keys {
         Some((modifiers, key)) => Some(KeyboardShortcut::new(modifiers, key)),
         None => None,
     };
-    Entry { action, menu, label, about, keys, icon }
+    Entry { action, menu, label, about, keys, short }
 }
 
 /// All actions but those of the Add menu's objects and lights, in the order of the menus.
 pub const ENTRIES: &[Entry] = &[
-    entry(Menu::File, Action::New, "New", "Start a new scene", Some((COMMAND, Key::N)), "🗋"),
-    entry(Menu::File, Action::Open, "Open…", "Open a scene or a model", Some((COMMAND, Key::O)), "🗁"),
+    entry(Menu::File, Action::New, "New", "Start a new scene", Some((COMMAND, Key::N)), "New"),
+    entry(Menu::File, Action::Open, "Open…", "Open a scene or a model", Some((COMMAND, Key::O)), "Open"),
     entry(Menu::File, Action::Import, "Import model…", "Add an OBJ or glTF model", Some((COMMAND, Key::I)), ""),
-    entry(Menu::File, Action::Save, "Save", "Save the scene", Some((COMMAND, Key::S)), "💾"),
+    entry(Menu::File, Action::Save, "Save", "Save the scene", Some((COMMAND, Key::S)), "Save"),
     entry(Menu::File, Action::SaveAs, "Save as…", "Save under another name", Some((COMMAND_SHIFT, Key::S)), ""),
     entry(Menu::File, Action::SavePicture, "Save picture…", "Save what was rendered", Some((COMMAND, Key::P)), ""),
     entry(Menu::File, Action::Quit, "Quit", "Close the editor", Some((COMMAND, Key::Q)), ""),
-    entry(Menu::Edit, Action::Undo, "Undo", "Take the last change back", Some((COMMAND, Key::Z)), "↩"),
-    entry(Menu::Edit, Action::Redo, "Redo", "Do it again", Some((COMMAND_SHIFT, Key::Z)), "↪"),
+    entry(Menu::Edit, Action::Undo, "Undo", "Take the last change back", Some((COMMAND, Key::Z)), "Undo"),
+    entry(Menu::Edit, Action::Redo, "Redo", "Do it again", Some((COMMAND_SHIFT, Key::Z)), "Redo"),
     entry(Menu::Edit, Action::Duplicate, "Duplicate", "Copy what is selected", Some((COMMAND, Key::D)), ""),
     entry(Menu::Edit, Action::Delete, "Delete", "Delete what is selected", Some((NONE, Key::Delete)), ""),
     entry(Menu::Edit, Action::Hide, "Hide or show", "Hide what is selected, or show it", Some((NONE, Key::H)), ""),
     entry(Menu::Edit, Action::SelectAll, "Select all", "Select every object", Some((COMMAND, Key::A)), ""),
     entry(Menu::Edit, Action::SelectNone, "Select none", "Select nothing", Some((COMMAND_SHIFT, Key::A)), ""),
-    entry(Menu::Edit, Action::Texture, "Texture…", "Choose an image for what is selected", Some((NONE, Key::T)), "🖼"),
+    entry(
+        Menu::Edit,
+        Action::Texture,
+        "Texture…",
+        "Choose an image for what is selected",
+        Some((NONE, Key::T)),
+        "Texture",
+    ),
     entry(Menu::View, Action::FrameSelected, "Frame selected", "Look at what is selected", Some((NONE, Key::F)), ""),
-    entry(Menu::View, Action::FrameAll, "Frame all", "Look at everything", Some((NONE, Key::Home)), "⛶"),
+    entry(Menu::View, Action::FrameAll, "Frame all", "Look at everything", Some((NONE, Key::Home)), "Frame"),
     entry(Menu::View, Action::Look(View::Front), "Front", "Look from the front", Some((NONE, Key::Num1)), ""),
     entry(Menu::View, Action::Look(View::Back), "Back", "Look from behind", Some((SHIFT, Key::Num1)), ""),
     entry(Menu::View, Action::Look(View::Right), "Right", "Look from the right", Some((NONE, Key::Num3)), ""),
@@ -204,17 +211,24 @@ pub const ENTRIES: &[Entry] = &[
     entry(Menu::View, Action::ToggleGrid, "Grid", "Show or hide the grid", Some((NONE, Key::G)), ""),
     entry(Menu::View, Action::ToggleWireframe, "Wireframe", "Show the edges", Some((NONE, Key::Z)), ""),
     entry(Menu::View, Action::ToggleTheme, "Light or dark", "Change the window's theme", None, ""),
-    entry(Menu::Tool, Action::Tool(Tool::Select), "Select", "Select objects and lights", Some((NONE, Key::Q)), "⬉"),
-    entry(Menu::Tool, Action::Tool(Tool::Move), "Move", "Move what is selected", Some((NONE, Key::W)), "✥"),
-    entry(Menu::Tool, Action::Tool(Tool::Rotate), "Rotate", "Turn what is selected", Some((NONE, Key::E)), "⟳"),
-    entry(Menu::Tool, Action::Tool(Tool::Scale), "Scale", "Scale what is selected", Some((NONE, Key::R)), "⤢"),
+    entry(
+        Menu::Tool,
+        Action::Tool(Tool::Select),
+        "Select",
+        "Select objects and lights",
+        Some((NONE, Key::Q)),
+        "Select",
+    ),
+    entry(Menu::Tool, Action::Tool(Tool::Move), "Move", "Move what is selected", Some((NONE, Key::W)), "Move"),
+    entry(Menu::Tool, Action::Tool(Tool::Rotate), "Rotate", "Turn what is selected", Some((NONE, Key::E)), "Rotate"),
+    entry(Menu::Tool, Action::Tool(Tool::Scale), "Scale", "Scale what is selected", Some((NONE, Key::R)), "Scale"),
     entry(
         Menu::Tool,
         Action::RenderFull,
         "Render Full Window",
         "Ray trace the whole picture",
         Some((NONE, Key::F5)),
-        "▶",
+        "Render",
     ),
     entry(
         Menu::Tool,
@@ -222,9 +236,9 @@ pub const ENTRIES: &[Entry] = &[
         "Render Region",
         "Ray trace a rectangle: drag it in the view",
         Some((NONE, Key::F6)),
-        "⛋",
+        "Region",
     ),
-    entry(Menu::Tool, Action::StopRender, "Stop", "Stop rendering", Some((NONE, Key::Escape)), "⏹"),
+    entry(Menu::Tool, Action::StopRender, "Stop", "Stop rendering", Some((NONE, Key::Escape)), "Stop"),
     entry(Menu::Tool, Action::ClearRender, "Clear picture", "Show the view again", Some((NONE, Key::F7)), ""),
     entry(
         Menu::Tool,
@@ -232,7 +246,7 @@ pub const ENTRIES: &[Entry] = &[
         "Explain a pixel",
         "Click a rendered pixel to see why it has its colour",
         Some((NONE, Key::F8)),
-        "❓",
+        "Explain",
     ),
     entry(Menu::Help, Action::ShowKeys, "Keys", "All keyboard shortcuts", Some((NONE, Key::F1)), ""),
     entry(Menu::Help, Action::ShowAbout, "About", "What this is", None, ""),

@@ -75,16 +75,16 @@ fn label_of(verb: &str, what: Option<&str>) -> String {
     what.map_or_else(|| verb.to_owned(), |what| format!("{verb}: {}", what.to_lowercase()))
 }
 
-/// The toolbar: every action that has a sign.
+/// The toolbar: every action that has a word for it.
 pub fn toolbar(ui: &mut Ui, editor: &Editor, edits: &mut Edits) {
     ui.horizontal_wrapped(|ui| {
-        ui.menu_button("✚", |ui| add_menu(ui, edits)).response.on_hover_text("Add an object or a light");
-        let light = ui.button("💡").on_hover_text("Add a point light");
+        ui.menu_button("Add…", |ui| add_menu(ui, edits)).response.on_hover_text("Add an object or a light");
+        let light = ui.button("Light").on_hover_text("Add a point light");
         if light.clicked() {
             edits.act(Action::AddLight(NewLight::Point));
         }
         let mut menu = None;
-        for entry in ENTRIES.iter().filter(|entry| !entry.icon.is_empty()) {
+        for entry in ENTRIES.iter().filter(|entry| !entry.short.is_empty()) {
             if menu.replace(entry.menu) != Some(entry.menu) {
                 ui.separator();
             }
@@ -95,7 +95,7 @@ pub fn toolbar(ui: &mut Ui, editor: &Editor, edits: &mut Edits) {
                 _ => false,
             };
             let keys = entry.keys.map_or_else(String::new, |keys| format!(" ({})", ui.ctx().format_shortcut(&keys)));
-            let button = egui::Button::new(entry.icon).selected(is_on);
+            let button = egui::Button::new(entry.short).selected(is_on);
             let response = ui.add_enabled(is_of_use(editor, entry.action), button);
             if response.on_hover_text(format!("{}: {}{keys}", entry.label, entry.about)).clicked() {
                 edits.act(entry.action);

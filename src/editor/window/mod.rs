@@ -88,6 +88,7 @@ pub struct Editor {
     kept_revision: u64,
     may_close: bool,
     frame_times: Vec<f32>,
+    title: String,
 }
 
 impl Editor {
@@ -126,6 +127,7 @@ impl Editor {
             kept_revision: revision,
             may_close: false,
             frame_times: Vec::new(),
+            title: String::new(),
         })
     }
 
@@ -495,9 +497,13 @@ impl Editor {
 
 impl eframe::App for Editor {
     fn ui(&mut self, ui: &mut Ui, frame: &mut eframe::Frame) {
-        let title = perform::window_title(&self.session);
-        ui.ctx().send_viewport_cmd(egui::ViewportCommand::Title(title));
         self.show(ui);
+        let title = perform::window_title(&self.session);
+        // Each command makes another frame.
+        if title != self.title {
+            ui.ctx().send_viewport_cmd(egui::ViewportCommand::Title(title.clone()));
+            self.title = title;
+        }
         if std::env::var_os("WHITTED_EDITOR_TIMES").is_some() {
             self.frame_times.push(frame.info().cpu_usage.unwrap_or(0.0));
         }

@@ -5,7 +5,7 @@ use eframe::egui::{self, Ui};
 use super::edits::{Ask, Edits};
 use crate::editor::{Command, Item, Kind, Session};
 
-/// Shows the list. A click selects, with Ctrl or Shift beside what is selected; the eye hides and shows.
+/// Shows the list. A click selects, with Ctrl or Shift beside what is selected; the box before an object hides and shows it.
 pub fn show(ui: &mut Ui, session: &Session, edits: &mut Edits) {
     let lists =
         [(Kind::Object, "Objects"), (Kind::Light, "Lights"), (Kind::Material, "Materials"), (Kind::Camera, "Cameras")];
@@ -15,9 +15,8 @@ pub fn show(ui: &mut Ui, session: &Session, edits: &mut Edits) {
             egui::CollapsingHeader::new(format!("{title} ({count})")).id_salt(title).default_open(true).show(
                 ui,
                 |ui| {
-                    let names = session.document().names(kind);
-                    for (index, name) in names.iter().enumerate() {
-                        entry(ui, session, edits, Item::new(kind, index), name);
+                    for index in 0..count {
+                        entry(ui, session, edits, Item::new(kind, index));
                     }
                     if kind == Kind::Light && count == 0 && !session.scene().lights.is_empty() {
                         ui.weak(format!("{} of the model", session.scene().lights.len()));
@@ -45,12 +44,13 @@ pub fn title(session: &Session, item: Item) -> String {
     format!("{} {}", what.replace('_', " "), item.index + 1)
 }
 
-fn entry(ui: &mut Ui, session: &Session, edits: &mut Edits, item: Item, _name: &str) {
+fn entry(ui: &mut Ui, session: &Session, edits: &mut Edits, item: Item) {
     ui.horizontal(|ui| {
         if item.kind == Kind::Object {
             let is_visible = session.is_visible(item.index);
-            let eye = ui.selectable_label(is_visible, "👁").on_hover_text(if is_visible { "Hide" } else { "Show" });
-            if eye.clicked() {
+            let mut shown = is_visible;
+            let about = if is_visible { "Hide" } else { "Show" };
+            if ui.checkbox(&mut shown, "").on_hover_text(about).changed() {
                 edits.apply(match is_visible {
                     true => Command::set(item, &["visible"], false),
                     false => Command::unset(item, &["visible"]),

@@ -27,7 +27,11 @@ impl Editor {
             return;
         }
         let types = ctx.egui_wants_keyboard_input();
-        for entry in ENTRIES {
+        // Keys with Shift first: those without it are pressed then too.
+        let with_shift = |wanted: bool| {
+            ENTRIES.iter().filter(move |entry| entry.keys.is_some_and(|keys| keys.modifiers.shift == wanted))
+        };
+        for entry in with_shift(true).chain(with_shift(false)) {
             let Some(keys) = entry.keys else { continue };
             // While a field is typed into, plain keys are letters.
             if types && !keys.modifiers.command && !matches!(entry.action, Action::RenderFull | Action::ShowKeys) {

@@ -293,7 +293,7 @@ fn terms(ui: &mut Ui, session: &Session, item: Item, material: &Material, edits:
             if ui.button(file.as_deref().unwrap_or("choose…")).clicked() {
                 edits.list.push(Ask::ChooseTexture(item));
             }
-            if file.is_some() && ui.small_button("✖").on_hover_text("Without an image").clicked() {
+            if file.is_some() && ui.small_button("none").on_hover_text("Without an image").clicked() {
                 edits.apply(Command::unset(item, &["texture"]));
             }
         });
