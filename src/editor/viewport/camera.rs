@@ -106,8 +106,8 @@ impl View {
         }
         // A little more on both sides, so that what lies in a side of the box is seen.
         let margin = 1e-3;
-        let least =
-            if self.is_parallel { 0.0 } else { (far * NEAREST_SHARE).max(far.min(self.focus) * NEAREST_TO_FOCUS) };
+        let nearest = (far * NEAREST_SHARE).max(far.min(self.focus) * NEAREST_TO_FOCUS);
+        let least = if self.is_parallel { 0.0 } else { nearest };
         self.depths = ((near - far * margin).max(least), far * (1.0 + margin));
         self
     }
