@@ -49,8 +49,9 @@ start() {
         sleep 0.1
     done
     xdotool windowmove "$window" 0 0 windowsize "$window" 1280 800
-    xdotool windowfocus "$window"
-    sleep 1.5
+    sleep 1
+    for _ in $(seq 20); do xdotool windowfocus "$window" 2>/dev/null && break; sleep 0.2; done
+    sleep 0.5
 }
 key() { for k in "$@"; do xdotool key "$k"; sleep 0.25; done; }
 click() { xdotool mousemove "$1" "$2"; sleep 0.15; xdotool click 1; sleep 0.35; }
@@ -64,17 +65,17 @@ drag() {
 type_path() { sleep 0.4; key ctrl+a; xdotool type --delay 8 "$1"; sleep 0.3; key Return; sleep 0.8; }
 shot() { import -window root "$folder/$1.png"; }
 title() { xdotool getwindowname "$window"; }
-# Until the picture is finished its file cannot be saved.
+# While a picture is rendered the window's title says what part of it is.
+finish() {
+    sleep 0.8
+    for _ in $(seq 600); do title | grep -q % || return 0; sleep 0.2; done
+    echo 'the picture is not finished'; exit 1
+}
 save_picture() {
-    rm -f "$1"
-    for _ in $(seq 120); do
-        sleep 0.5
-        key ctrl+p
-        type_path "$1"
-        [ -s "$1" ] && return
-        key Escape
-    done
-    echo "no picture was saved as $1"; exit 1
+    finish
+    key ctrl+p
+    type_path "$1"
+    [ -s "$1" ] || { shot not-saved; echo "no picture was saved as $1"; exit 1; }
 }
 expect() { grep -q -- "$1" "$2" || { echo "$2 has no \`$1\`:"; cat "$2"; exit 1; }; }
 
@@ -105,7 +106,7 @@ key w; drag 585 404 585 360; shot 05-moved
 click 88 12; click 114 324; shot 06-light
 # The light's colour: the button, and a place in the field of colours that it opens.
 click 1070 86; shot 07-colour-picker
-click 1130 190; key Escape; shot 08-colour
+click 1000 200; key Escape; shot 08-colour
 # The sphere again, and an image for it.
 click 70 108; key t; type_path "$root/meshes/checker.png"; shot 09-texture
 key Left Left; shot 10-turned

@@ -1,6 +1,7 @@
 //! Draws a scene's pieces, its background and the lines over it into a picture.
 
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -204,7 +205,7 @@ impl Painter {
         gl.set_default(3, Vec4::ONE);
         let Some(uploaded) = self.pieces.get(&key(batch)) else { return Ok(()) };
         match &uploaded.edges {
-            Some(edges) if frame.wireframe => gl.draw(edges, Shape::Lines, &[0..u32::MAX]),
+            Some(edges) if frame.wireframe => gl.draw(edges, Shape::Lines, std::slice::from_ref(&(0..u32::MAX))),
             _ => gl.draw(&uploaded.geometry, Shape::Triangles, &batch.parts),
         }
         Ok(())
@@ -213,15 +214,14 @@ impl Painter {
     fn upload(&mut self, gl: &Gl, batch: &Batch<'_>, wireframe: bool) -> Result<()> {
         let piece = batch.piece;
         let key = key(batch);
-        if !self.pieces.contains_key(&key) {
-            let geometry = geometry(gl, piece, &piece.indices)?;
-            let uploaded = Uploaded { _shown: batch.placed.shown.clone(), geometry, edges: None, is_used: true };
-            self.pieces.insert(key, uploaded);
-        }
-        if let Some(uploaded) = self.pieces.get_mut(&key)
-            && uploaded.edges.is_none()
-            && wireframe
-        {
+        let uploaded = match self.pieces.entry(key) {
+            Entry::Occupied(known) => known.into_mut(),
+            Entry::Vacant(place) => {
+                let geometry = geometry(gl, piece, &piece.indices)?;
+                place.insert(Uploaded { _shown: batch.placed.shown.clone(), geometry, edges: None, is_used: true })
+            }
+        };
+        if uploaded.edges.is_none() && wireframe {
             uploaded.edges = Some(geometry(gl, piece, &edges(piece))?);
         }
         Ok(())

@@ -59,7 +59,8 @@ impl Overlay {
     }
 }
 
-/// What is being dragged in the view.
+/// What is being dragged in the view. There is one at most, so that its size is of no interest.
+#[allow(clippy::large_enum_variant)]
 #[derive(Debug, Clone, Copy)]
 pub enum Drag {
     /// A handle, from where in the picture it was taken.

@@ -498,7 +498,8 @@ impl Editor {
 impl eframe::App for Editor {
     fn ui(&mut self, ui: &mut Ui, frame: &mut eframe::Frame) {
         self.show(ui);
-        let title = perform::window_title(&self.session);
+        let rendered = self.worker.rendering().map(|(_, part, _)| part);
+        let title = perform::window_title(&self.session, rendered);
         // Each command makes another frame.
         if title != self.title {
             ui.ctx().send_viewport_cmd(egui::ViewportCommand::Title(title.clone()));
@@ -533,7 +534,7 @@ pub fn run(input: Option<&Path>, options: &LoadOptions) -> Result<()> {
         None => Session::new(Path::new(""))?,
     };
     let viewport = egui::ViewportBuilder::default()
-        .with_title(perform::window_title(&session))
+        .with_title(perform::window_title(&session, None))
         .with_app_id("whitted")
         .with_inner_size([1280.0, 800.0])
         .with_min_inner_size([640.0, 400.0]);

@@ -14,10 +14,11 @@ use crate::editor::{Command, Item, Kind, Session, presets};
 use crate::formats::picture;
 use crate::scene::Shape;
 
-/// What the window is called: the file, and whether there is something to save.
-pub fn window_title(session: &Session) -> String {
+/// What the window is called: the file, whether there is something to save, and what part of a picture is rendered.
+pub fn window_title(session: &Session, rendered: Option<f32>) -> String {
     let name = session.path().and_then(Path::file_name).map_or("untitled".into(), |name| name.to_string_lossy());
-    format!("{}{name} - whitted", if session.is_changed() { "*" } else { "" })
+    let part = rendered.map_or_else(String::new, |part| format!("{:.0} % - ", part * 100.0));
+    format!("{part}{}{name} - whitted", if session.is_changed() { "*" } else { "" })
 }
 
 impl Editor {
