@@ -32,7 +32,7 @@ rm -f "$folder"/*.png "$folder"/*.toml "$folder"/*.err
 export XDG_DATA_HOME="$folder/data" LIBGL_ALWAYS_SOFTWARE=1 WINIT_X11_SCALE_FACTOR=1
 rm -rf "$XDG_DATA_HOME"
 unset WAYLAND_DISPLAY
-exec 9< <(exec Xvfb -displayfd 1 -screen 0 1280x800x24 2>/dev/null)
+exec 9< <(exec Xvfb -noreset -displayfd 1 -screen 0 1280x800x24 2>/dev/null)
 server=$!
 read -r -u 9 number
 export DISPLAY=":$number"
