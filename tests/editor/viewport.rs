@@ -175,16 +175,19 @@ fn measure(gl: &Arc<eframe::glow::Context>, folder: &Path, files: &[PathBuf]) {
         println!("  stand-ins after {:.2} s", start.elapsed().as_secs_f64());
         for (what, options) in [("full", Options::default()), ("moving", moving)] {
             let (mut frames, mut triangles) = (0u32, 0);
+            let size = if std::env::var_os("SMALL").is_some() { (64, 40) } else { SIZE };
             let start = Instant::now();
             while frames < 40 && (frames < 4 || start.elapsed() < Duration::from_secs(10)) {
                 frames += 1;
-                let stats = viewport.draw(&scene, &turned(&camera, frames), SIZE, &options).unwrap();
+                let stats = viewport.draw(&scene, &turned(&camera, frames), size, &options).unwrap();
                 viewport.finish();
                 triangles = stats.triangles;
             }
             let rate = f64::from(frames) / start.elapsed().as_secs_f64();
             println!("  {what}: {rate:.1} frames a second, {triangles} triangles in the last");
-            save(&viewport.pixels(), &folder.join(format!("{stem}.{what}.png")));
+            if size == SIZE {
+                save(&viewport.pixels(), &folder.join(format!("{stem}.{what}.png")));
+            }
         }
     }
     viewport.destroy();

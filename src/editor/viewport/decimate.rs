@@ -25,7 +25,11 @@ pub fn decimate(piece: &Piece, most: usize) -> Piece {
         coarse = Coarse::of(piece, cell);
     }
     let mut result = Piece::of(&coarse, piece.origin, piece.scale);
-    result.is_closed = false;
+    // What is closed stays so, but for where its own sides meet.
+    (result.is_closed, result.is_inside_out) = (piece.is_closed, piece.is_inside_out);
+    if piece.is_inside_out {
+        result.clusters.iter_mut().for_each(|cluster| cluster.axis = -cluster.axis);
+    }
     result
 }
 
@@ -96,11 +100,14 @@ impl<'a> Coarse<'a> {
             let indices = &piece.indices[cluster.indices.start as usize..cluster.indices.end as usize];
             for corners in indices.chunks_exact(3) {
                 let corners = [corners[0], corners[1], corners[2]].map(|vertex| vertex_of[vertex as usize]);
+                // Of thin walls both sides stay, and each of their triangles once, whichever corner comes first.
                 let mut cells = corners.map(|vertex| cell_of_vertex[vertex as usize]);
-                cells.sort_unstable();
+                let least = (0..3).min_by_key(|&k| cells[k]).unwrap_or(0);
+                cells.rotate_left(least);
                 let [a, b, c] = corners.map(|vertex| coarse.positions[vertex as usize].as_dvec3());
                 let is_thin = cross(b - a, c - a) == DVec3::ZERO;
-                if cells[0] != cells[1] && cells[1] != cells[2] && !is_thin && seen.insert(cells) {
+                let is_whole = cells[0] != cells[1] && cells[1] != cells[2] && cells[2] != cells[0];
+                if is_whole && !is_thin && seen.insert(cells) {
                     coarse.triangles.push((corners, cluster.material));
                 }
             }

@@ -35,6 +35,7 @@ pub struct Program {
 pub struct Geometry {
     array: glow::VertexArray,
     buffers: Vec<glow::Buffer>,
+    own_indices: Option<glow::Buffer>,
     vertices: u32,
     indices: u32,
 }
@@ -276,14 +277,16 @@ impl Gl {
                     gl.vertex_attrib_pointer_f32(number, count, kind, is_fraction, attribute.stride, start);
                 }
             }
+            let mut own_indices = None;
             if !indices.is_empty() {
                 let buffer = gl.create_buffer().map_err(limit)?;
+                own_indices = Some(buffer);
                 buffers.push(buffer);
                 gl.bind_buffer(glow::ELEMENT_ARRAY_BUFFER, Some(buffer));
                 gl.buffer_data_u8_slice(glow::ELEMENT_ARRAY_BUFFER, bytemuck::cast_slice(indices), glow::STATIC_DRAW);
             }
             gl.bind_vertex_array(None);
-            let geometry = Geometry { array, buffers, vertices, indices: indices.len() as u32 };
+            let geometry = Geometry { array, buffers, own_indices, vertices, indices: indices.len() as u32 };
             if gl.get_error() == glow::OUT_OF_MEMORY {
                 self.delete_geometry(geometry);
                 return Err(limit("its memory is full".into()));
@@ -311,6 +314,26 @@ impl Gl {
                 }
             }
             gl.bind_vertex_array(None);
+        }
+    }
+
+    /// Draws triangles of a geometry by indices that are passed along; none if one of them is beyond its vertices.
+    pub fn draw_listed(&self, geometry: &Geometry, indices: &[u32]) {
+        let gl = &self.raw;
+        let is_within = indices.iter().fold(true, |within, &index| within & (index < geometry.vertices));
+        if indices.is_empty() || !is_within || indices.len() > i32::MAX as usize / 4 {
+            return;
+        }
+        // SAFETY: see the module; the indices were just checked. The array's own indices are bound again.
+        unsafe {
+            let Ok(buffer) = gl.create_buffer() else { return };
+            gl.bind_vertex_array(Some(geometry.array));
+            gl.bind_buffer(glow::ELEMENT_ARRAY_BUFFER, Some(buffer));
+            gl.buffer_data_u8_slice(glow::ELEMENT_ARRAY_BUFFER, bytemuck::cast_slice(indices), glow::STREAM_DRAW);
+            gl.draw_elements(glow::TRIANGLES, indices.len() as i32, glow::UNSIGNED_INT, 0);
+            gl.bind_buffer(glow::ELEMENT_ARRAY_BUFFER, geometry.own_indices);
+            gl.bind_vertex_array(None);
+            gl.delete_buffer(buffer);
         }
     }
 

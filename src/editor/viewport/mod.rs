@@ -13,6 +13,7 @@ pub mod lines;
 pub mod painter;
 pub mod piece;
 pub mod preview;
+pub mod sieve;
 pub mod terms;
 pub mod tessellate;
 
@@ -157,8 +158,7 @@ impl Viewport {
         };
 
         gl.begin(target);
-        painter.sky(gl, &frame)?;
-        let triangles = painter.surfaces(gl, &frame)?;
+        let triangles = painter.scene(gl, &frame)?;
         if options.grid {
             let mut lines = Lines::default();
             lines.add_grid(&near, frame.origin);

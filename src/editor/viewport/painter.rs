@@ -13,17 +13,22 @@ use crate::editor::viewport::images::{Images, placing};
 use crate::editor::viewport::lines::{LineVertex, Lines};
 use crate::editor::viewport::piece::{Cluster, Piece};
 use crate::editor::viewport::preview::{Drawing, Placed, Shown};
+use crate::editor::viewport::sieve::{Sides, sift};
 use crate::editor::viewport::terms::{Lights, Terms};
 use crate::error::Result;
 use crate::math::transform::Transform;
 use crate::math::vector::{dot, length};
 use crate::scene::{Background, Rgb, Scene, Transfer};
 
+const ENCODE: &str = include_str!("shaders/encode.glsl");
 const INPUTS: [&str; 4] = ["position", "normal", "uvs", "color"];
 const LINE_INPUTS: [&str; 4] = ["position", "other", "side", "color"];
 
 /// So many triangles are drawn while the camera moves, where there are more.
 pub const MOVING_TRIANGLES: usize = 80_000;
+
+/// From so many triangles on it pays to look which of them reach a pixel, where the processor draws.
+const SIEVED: u64 = 20_000;
 
 /// A piece on the graphics card.
 struct Uploaded {
@@ -36,14 +41,57 @@ struct Uploaded {
 
 /// Programs, and what is on the graphics card of the scene drawn last.
 pub struct Painter {
-    surface: Program,
+    surfaces: HashMap<Variant, Program>,
     sky: Program,
+    sky_image: Program,
     line: Program,
     copy: Program,
     /// No values at all, for what the shader makes of vertices' numbers.
     nothing: Geometry,
     pieces: HashMap<(usize, bool), Uploaded>,
     images: Images,
+}
+
+/// What a surface's shaders are compiled with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+struct Variant {
+    lights: usize,
+    near_lights: bool,
+    glossy: bool,
+    mirrors: bool,
+    images: bool,
+    holes: bool,
+}
+
+impl Variant {
+    fn of(terms: &Terms, lights: &Lights) -> Self {
+        Self {
+            lights: lights.places.len(),
+            near_lights: lights.places.iter().any(|place| place.w != 0.0),
+            glossy: terms.shine != Rgb::ZERO,
+            mirrors: terms.mirror != Rgb::ZERO,
+            images: terms.texture.is_some() || terms.glow_texture.is_some(),
+            holes: terms.cutoff > 0.0,
+        }
+    }
+
+    fn compiled(self, gl: &Gl) -> Result<Program> {
+        let mut defined = format!("#define LIGHTS {}\n", self.lights);
+        for (name, is_defined) in [
+            ("NEAR_LIGHTS", self.near_lights),
+            ("GLOSSY", self.glossy),
+            ("MIRRORS", self.mirrors),
+            ("IMAGES", self.images),
+            ("HOLES", self.holes),
+        ] {
+            if is_defined {
+                defined += &format!("#define {name}\n");
+            }
+        }
+        let vertex = format!("{defined}{}", include_str!("shaders/surface.vert"));
+        let fragment = format!("{defined}{ENCODE}{}", include_str!("shaders/surface.frag"));
+        gl.program(&vertex, &fragment, &INPUTS)
+    }
 }
 
 /// What stays the same throughout a picture.
@@ -73,6 +121,7 @@ struct Batch<'a> {
     is_stand_in: bool,
     material: u32,
     parts: Vec<Range<u32>>,
+    sides: Sides,
     depth: f64,
 }
 
@@ -82,16 +131,12 @@ impl Painter {
     /// # Errors
     /// What the driver does not support.
     pub fn new(gl: &Gl) -> Result<Self> {
-        let encode = include_str!("shaders/encode.glsl");
-        let with_encode = |source: &str| format!("{encode}{source}");
         let sky = include_str!("shaders/sky.vert");
+        let sky_of = |defined: &str| format!("{defined}{ENCODE}{}", include_str!("shaders/sky.frag"));
         Ok(Self {
-            surface: gl.program(
-                include_str!("shaders/surface.vert"),
-                &with_encode(include_str!("shaders/surface.frag")),
-                &INPUTS,
-            )?,
-            sky: gl.program(sky, &with_encode(include_str!("shaders/sky.frag")), &[])?,
+            surfaces: HashMap::new(),
+            sky: gl.program(sky, &sky_of(""), &[])?,
+            sky_image: gl.program(sky, &sky_of("#define IMAGES\n"), &[])?,
             line: gl.program(include_str!("shaders/line.vert"), include_str!("shaders/line.frag"), &LINE_INPUTS)?,
             copy: gl.program(sky, include_str!("shaders/copy.frag"), &[])?,
             nothing: gl.geometry(&[], &[])?,
@@ -100,11 +145,11 @@ impl Painter {
         })
     }
 
-    /// Draws the background over the whole picture.
+    /// Draws the background where nothing is.
     ///
     /// # Errors
     /// A limit where there is no room for its image.
-    pub fn sky(&mut self, gl: &Gl, frame: &Frame<'_>) -> Result<()> {
+    fn sky(&mut self, gl: &Gl, frame: &Frame<'_>) -> Result<()> {
         let (bottom, top, up) = sky_colors(&frame.scene.background);
         let image = match &frame.scene.background {
             Background::Image { texture, .. } => Some(self.images.of(gl, texture)?),
@@ -117,8 +162,9 @@ impl Painter {
         let (width, height) = frame.view.size();
         let direction = |x: f64, y: f64| frame.view.ray(DVec2::new(x, y)).1;
         let corner = direction(0.0, 0.0);
-        let set = |name: &str, value: Value<'_>| gl.set(&self.sky, name, value);
-        gl.use_program(&self.sky);
+        let program = if image.is_some() { &self.sky_image } else { &self.sky };
+        let set = |name: &str, value: Value<'_>| gl.set(program, name, value);
+        gl.use_program(program);
         // Of any length, but all together of one that f32 holds.
         let unit = 1.0 / length(corner).max(f64::MIN_POSITIVE);
         set("corner_direction", Value::Vec3((corner * unit).as_vec3()));
@@ -128,21 +174,19 @@ impl Painter {
         set("sky_top", Value::Vec3(top));
         set("sky_up", Value::Vec3(up));
         set("image", Value::Int(0));
-        set("has_image", Value::Int(i32::from(image.is_some())));
-        self.set_film(gl, frame.scene, &self.sky);
+        set_film(gl, frame.scene, program);
         gl.bind_image(0, image);
-        gl.set_mode(Mode { tests_depth: false, writes_depth: false, blends: false, culls: None });
+        gl.set_mode(Mode { tests_depth: true, writes_depth: false, blends: false, culls: None });
         gl.draw_all(&self.nothing, 3);
         Ok(())
     }
 
-    /// Draws all pieces, those that hide what is behind first; says how many triangles were drawn.
+    /// Draws all pieces and, where they leave it free, the background; then what it is seen through. Says how many triangles
+    /// were drawn.
     ///
     /// # Errors
     /// A limit where there is no room.
-    pub fn surfaces(&mut self, gl: &Gl, frame: &Frame<'_>) -> Result<u64> {
-        gl.use_program(&self.surface);
-        self.set_frame(gl, frame);
+    pub fn scene(&mut self, gl: &Gl, frame: &Frame<'_>) -> Result<u64> {
         let mut batches = batches(frame);
         // What hides others from the nearest on, the rest from the farthest on.
         let is_blended = |batch: &Batch<'_>| frame.terms[batch.material as usize].is_blended;
@@ -150,15 +194,33 @@ impl Painter {
             let order = a.depth.total_cmp(&b.depth);
             is_blended(a).cmp(&is_blended(b)).then(if is_blended(a) { order.reverse() } else { order })
         });
+        let (blended, hiding): (Vec<_>, Vec<_>) = batches.iter().partition(|batch| is_blended(batch));
+        let mut triangles = self.surfaces(gl, frame, &hiding)?;
+        self.sky(gl, frame)?;
+        triangles += self.surfaces(gl, frame, &blended)?;
+        Ok(triangles)
+    }
+
+    fn surfaces(&mut self, gl: &Gl, frame: &Frame<'_>, batches: &[&Batch<'_>]) -> Result<u64> {
+        let mut in_use = None;
         let mut triangles = 0;
-        for batch in &batches {
-            triangles += batch.parts.iter().map(|part| u64::from(part.end - part.start) / 3).sum::<u64>();
-            self.batch(gl, frame, batch)?;
+        for batch in batches {
+            let variant = Variant::of(&frame.terms[batch.material as usize], frame.lights);
+            if let Entry::Vacant(place) = self.surfaces.entry(variant) {
+                place.insert(variant.compiled(gl)?);
+            }
+            if in_use.replace(variant) != Some(variant)
+                && let Some(program) = self.surfaces.get(&variant)
+            {
+                gl.use_program(program);
+                set_frame(gl, frame, program);
+            }
+            triangles += self.batch(gl, frame, batch, variant)?;
         }
         Ok(triangles)
     }
 
-    fn batch(&mut self, gl: &Gl, frame: &Frame<'_>, batch: &Batch<'_>) -> Result<()> {
+    fn batch(&mut self, gl: &Gl, frame: &Frame<'_>, batch: &Batch<'_>, variant: Variant) -> Result<u64> {
         let terms = &frame.terms[batch.material as usize];
         let texture = |painter: &mut Self, reference: Option<&crate::scene::TextureRef>| -> Result<Option<Image>> {
             let texture = reference.map(|reference| &frame.scene.textures[reference.texture as usize]);
@@ -169,7 +231,8 @@ impl Painter {
         gl.bind_image(1, glow);
         self.upload(gl, batch, frame.wireframe)?;
 
-        let set = |name: &str, value: Value<'_>| gl.set(&self.surface, name, value);
+        let Some(program) = self.surfaces.get(&variant) else { return Ok(0) };
+        let set = |name: &str, value: Value<'_>| gl.set(program, name, value);
         let transform = &batch.placed.transform;
         set("to_clip", Value::Mat4(rows_matrix(clip_rows(frame.view, transform))));
         let m = transform.to_world();
@@ -203,12 +266,19 @@ impl Painter {
         // What a geometry lacks: coordinates of 0 and white.
         gl.set_default(2, Vec4::ZERO);
         gl.set_default(3, Vec4::ONE);
-        let Some(uploaded) = self.pieces.get(&key(batch)) else { return Ok(()) };
+        let Some(uploaded) = self.pieces.get(&key(batch)) else { return Ok(0) };
+        let count = batch.parts.iter().map(|part| u64::from(part.end - part.start) / 3).sum();
         match &uploaded.edges {
             Some(edges) if frame.wireframe => gl.draw(edges, Shape::Lines, std::slice::from_ref(&(0..u32::MAX))),
+            _ if gl.is_software && count >= SIEVED => {
+                let rows = clip_rows(frame.view, transform);
+                let indices = sift(batch.piece, &batch.parts, rows, frame.view.size(), batch.sides);
+                gl.draw_listed(&uploaded.geometry, &indices);
+                return Ok(indices.len() as u64 / 3);
+            }
             _ => gl.draw(&uploaded.geometry, Shape::Triangles, &batch.parts),
         }
-        Ok(())
+        Ok(count)
     }
 
     fn upload(&mut self, gl: &Gl, batch: &Batch<'_>, wireframe: bool) -> Result<()> {
@@ -291,34 +361,36 @@ impl Painter {
         self.pieces.drain().for_each(|(_, uploaded)| uploaded.destroy(gl));
         self.images.destroy(gl);
         gl.delete_geometry(self.nothing);
-        [self.surface, self.sky, self.line, self.copy].into_iter().for_each(|program| gl.delete_program(program));
+        self.surfaces
+            .into_values()
+            .chain([self.sky, self.sky_image, self.line, self.copy])
+            .for_each(|program| gl.delete_program(program));
     }
+}
 
-    fn set_frame(&self, gl: &Gl, frame: &Frame<'_>) {
-        let set = |name: &str, value: Value<'_>| gl.set(&self.surface, name, value);
-        let eye = match frame.view.eye() {
-            Eye::At(eye) => (eye - frame.origin).as_vec3().extend(1.0),
-            Eye::Parallel(direction) => (-direction).as_vec3().extend(0.0),
-        };
-        set("eye", Value::Vec4(eye));
-        set("light_count", Value::Int(frame.lights.places.len() as i32));
-        set("light_places", Value::Vec4s(&frame.lights.places));
-        set("light_colors", Value::Vec4s(&frame.lights.colors));
-        set("light_cones", Value::Vec4s(&frame.lights.cones));
-        set("light_rims", Value::Floats(&frame.lights.rims));
-        let (bottom, top, up) = sky_colors(&frame.scene.background);
-        set("sky_bottom", Value::Vec3(bottom));
-        set("sky_top", Value::Vec3(top));
-        set("sky_up", Value::Vec3(up));
-        set("image", Value::Int(0));
-        set("glow_image", Value::Int(1));
-        self.set_film(gl, frame.scene, &self.surface);
-    }
+fn set_frame(gl: &Gl, frame: &Frame<'_>, program: &Program) {
+    let set = |name: &str, value: Value<'_>| gl.set(program, name, value);
+    let eye = match frame.view.eye() {
+        Eye::At(eye) => (eye - frame.origin).as_vec3().extend(1.0),
+        Eye::Parallel(direction) => (-direction).as_vec3().extend(0.0),
+    };
+    set("eye", Value::Vec4(eye));
+    set("light_places", Value::Vec4s(&frame.lights.places));
+    set("light_colors", Value::Vec4s(&frame.lights.colors));
+    set("light_cones", Value::Vec4s(&frame.lights.cones));
+    set("light_rims", Value::Floats(&frame.lights.rims));
+    let (bottom, top, up) = sky_colors(&frame.scene.background);
+    set("sky_bottom", Value::Vec3(bottom));
+    set("sky_top", Value::Vec3(top));
+    set("sky_up", Value::Vec3(up));
+    set("image", Value::Int(0));
+    set("glow_image", Value::Int(1));
+    set_film(gl, frame.scene, program);
+}
 
-    fn set_film(&self, gl: &Gl, scene: &Scene, program: &Program) {
-        gl.set(program, "exposure", Value::Float(libm::exp2f(scene.film.exposure)));
-        gl.set(program, "is_linear", Value::Int(i32::from(scene.film.transfer == Transfer::Linear)));
-    }
+fn set_film(gl: &Gl, scene: &Scene, program: &Program) {
+    gl.set(program, "exposure", Value::Float(libm::exp2f(scene.film.exposure)));
+    gl.set(program, "is_linear", Value::Int(i32::from(scene.film.transfer == Transfer::Linear)));
 }
 
 impl Uploaded {
@@ -357,8 +429,9 @@ fn batches<'a>(frame: &Frame<'a>) -> Vec<Batch<'a>> {
                 _ => {
                     let depth = frame.view.depth(placed.transform.point_to_world(cluster.center.as_dvec3()));
                     let parts = vec![cluster.indices.clone()];
+                    let sides = if hides { sight.sides(placed, piece) } else { Sides::Both };
                     let is_stand_in = stand_in.is_some();
-                    batches.extend(latest.replace(Batch { placed, piece, is_stand_in, material, parts, depth }));
+                    batches.extend(latest.replace(Batch { placed, piece, is_stand_in, material, parts, sides, depth }));
                 }
             }
         }
@@ -395,6 +468,15 @@ impl Sight {
         let center = cluster.center.as_dvec3();
         // Written so that NaN is seen.
         self.planes.iter().all(|plane| !(dot(plane.truncate(), center) + plane.w < -f64::from(cluster.radius)))
+    }
+
+    /// Which sides of triangles are seen.
+    fn sides(&self, placed: &Placed, piece: &Piece) -> Sides {
+        match (self.from, placed.transform.is_mirroring() != piece.is_inside_out) {
+            (None, _) => Sides::Both,
+            (Some(_), false) => Sides::CounterClockwise,
+            (Some(_), true) => Sides::Clockwise,
+        }
     }
 
     /// Whether all of its faces look away.

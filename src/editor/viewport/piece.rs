@@ -60,6 +60,8 @@ pub struct Piece {
     pub bounds: (Vec3, Vec3),
     /// Whether its triangles are the whole outside of a body, so that those seen from behind are hidden.
     pub is_closed: bool,
+    /// Whether the fronts of a closed piece look inward.
+    pub is_inside_out: bool,
 }
 
 /// Where a piece comes from: triangles over vertices.
@@ -129,6 +131,7 @@ impl Piece {
             clusters: Vec::new(),
             bounds: (Vec3::ZERO, Vec3::ZERO),
             is_closed: false,
+            is_inside_out: false,
         };
         parts.into_iter().for_each(|part| piece.append(part));
         piece.bounds = bounds_of(&piece.vertices);
@@ -209,7 +212,8 @@ impl Piece {
         let volume: f64 = self.indices.par_chunks_exact(3).map(volume).sum();
         // Scans have pinholes, through which nothing is seen of the inside.
         self.is_closed = open * 1000 < edges.len() as u64;
-        if volume < 0.0 {
+        self.is_inside_out = volume < 0.0;
+        if self.is_inside_out {
             self.clusters.iter_mut().for_each(|cluster| cluster.axis = -cluster.axis);
         }
     }

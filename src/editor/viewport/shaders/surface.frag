@@ -1,5 +1,6 @@
 in vec4 v_tinted;
 in vec3 v_plain;
+#ifdef IMAGES
 in vec2 v_uv;
 in vec2 v_glow_uv;
 
@@ -8,6 +9,7 @@ uniform sampler2D glow_image;
 uniform bool has_image;
 uniform bool has_glow_image;
 uniform vec3 glow;
+#endif
 // What multiplies alpha; the alpha below which there is nothing; 1 where vertices' and the image's alpha count.
 uniform vec3 alpha;
 uniform float exposure;
@@ -16,15 +18,23 @@ uniform bool is_linear;
 out vec4 seen;
 
 void main() {
-    vec4 texel = has_image ? texture(image, v_uv) : vec4(1.0);
-    float here = alpha.x * (alpha.z > 0.5 ? texel.a * v_tinted.a : 1.0);
-    if (here < alpha.y) {
-        discard;
+    vec4 texel = vec4(1.0);
+    vec3 light = v_plain;
+#ifdef IMAGES
+    if (has_image) {
+        texel = texture(image, v_uv);
     }
-    vec3 light = v_tinted.rgb * texel.rgb + v_plain;
     if (has_glow_image) {
         light += glow * texture(glow_image, v_glow_uv).rgb;
     }
-    float opacity = alpha.y > 0.0 ? 1.0 : here;
-    seen = vec4(encoded(light * exposure, is_linear) * opacity, opacity);
+#endif
+    float here = alpha.x * (alpha.z > 0.5 ? texel.a * v_tinted.a : 1.0);
+#ifdef HOLES
+    if (here < alpha.y) {
+        discard;
+    }
+    here = 1.0;
+#endif
+    light += v_tinted.rgb * texel.rgb;
+    seen = vec4(encoded(light * exposure, is_linear) * here, here);
 }

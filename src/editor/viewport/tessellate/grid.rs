@@ -59,6 +59,7 @@ impl Grid {
             }
             let near = endless[axis].then_some([fineness.near.min[axis], fineness.near.max[axis]]);
             ticks[axis] = planes(first, last, cell, cells, near)?;
+            pass_through(&mut ticks[axis], quadric.center()[axis]);
         }
         let mut grid = Self { ticks, cuts, values: Vec::new() };
         let size = grid.size();
@@ -88,6 +89,17 @@ impl Grid {
 
     pub(super) fn is_inside(&self, node: UVec3) -> bool {
         self.value(node) <= 0.0
+    }
+}
+
+/// Moves the nearest of the inner planes to a place, such as that of an apex, which is then a node.
+fn pass_through(planes: &mut [f64], place: f64) {
+    let last = planes.len() - 1;
+    if let Some(nearest) = (1..last).min_by(|&a, &b| (planes[a] - place).abs().total_cmp(&(planes[b] - place).abs()))
+        && planes[nearest - 1] < place
+        && place < planes[nearest + 1]
+    {
+        planes[nearest] = place;
     }
 }
 
