@@ -121,7 +121,7 @@ const MISTAKES: &[(&str, &str)] = &[
     // Objects.
     (
         "[[object]]\nname = \"a\"",
-        "1:1: an object needs a shape; one of `mesh`, `sphere`, `ellipsoid`, `cylinder`, `cone`, `paraboloid`, \
+        "1:1: an object needs a shape; one of `mesh`, `builtin`, `sphere`, `ellipsoid`, `cylinder`, `cone`, `paraboloid`, \
         `hyperboloid_one_sheet`, `hyperboloid_two_sheets`, `saddle`, `plane`, `quadric`",
     ),
     (
