@@ -39,12 +39,12 @@
 //! | [`render`] | the seed's call graph: ray_tracing, trace, intersect, shade |
 //! | [`formats`] | OBJ, glTF and scene files in, pictures out |
 //! | `measure` | exact answers, the hard cases, speed against error, the bench, behind the feature `measure` |
+//! | `editor` | a scene edited by commands, and the window that shows it, behind the feature `editor` |
 //! | `cli` | the command line, behind the feature `cli` |
 //!
 //! Imports go one way: `math, error, progress -> geometry -> {scene, accel} -> render -> formats -> measure ->
-//! cli`; a test reads
-//! the source and fails on a backward one. `scene` and `accel` do not know each other and meet in
-//! [`render::intersect`]. Below `cli` nothing prints, reads arguments or exits.
+//! editor -> cli`; a test reads the source and fails on a backward one. `scene` and `accel` do not know each other and meet in
+//! [`render::intersect`]. Below `editor` nothing prints, reads arguments or exits.
 //!
 //! # Designs that were rejected
 //!

@@ -10,6 +10,8 @@ mod common;
 mod detail;
 mod diff;
 mod doctor;
+mod explain;
+mod explain_command;
 mod far_from_origin;
 mod golden;
 mod golden_models;

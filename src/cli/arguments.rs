@@ -8,6 +8,8 @@ use clap_complete::Shell;
 use super::bench::BenchArguments;
 use super::check::CheckArguments;
 use super::diff::DiffArguments;
+use super::edit::EditArguments;
+use super::explain::ExplainArguments;
 use super::memory_limit::kind_within;
 use super::precision::Precision;
 use super::query::QueryArguments;
@@ -46,10 +48,14 @@ pub enum Command {
     Check(CheckArguments),
     /// Answer rays from a file: what each hits, and where.
     Query(Box<QueryArguments>),
+    /// Tell why a pixel has its colour: its rays, what they hit, and every term that was added.
+    Explain(Box<ExplainArguments>),
     /// Measure speed against error on models, scenes or built-in hard meshes, as tables and plots.
     Report(ReportArguments),
     /// Compare acceleration structures, and Embree, on the same rays: which suits this model?
     Bench(Box<BenchArguments>),
+    /// Edit a scene or a model in a window, and render it there. Needs a build with the feature `editor`.
+    Edit(Box<EditArguments>),
     /// Print a shell's completion script to standard output.
     Completions {
         /// The shell.
@@ -107,10 +113,10 @@ pub struct RenderArguments {
     pub build: BuildArguments,
 }
 
-/// Flags that replace fields of the scene's film, or choose what of it is rendered.
+/// Flags that replace those fields of the scene's film on which linear values depend.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Picture")]
-pub struct FilmArguments {
+pub struct ValueArguments {
     /// Width and height in pixels.
     #[arg(long, value_name = "WxH", value_parser = values::size)]
     pub size: Option<(u32, u32)>,
@@ -120,15 +126,24 @@ pub struct FilmArguments {
     /// How often a ray may be reflected or refracted, up to 1000; 0 is direct light alone.
     #[arg(long, value_name = "N", value_parser = values::count(0..=LARGEST_DEPTH))]
     pub max_depth: Option<u32>,
+    /// When colours are clamped to 1: after every shade (the seed's rule) or when they are written.
+    #[arg(long, value_name = "WHEN", value_parser = one_of(CLAMPS))]
+    pub clamp: Option<Clamp>,
+}
+
+/// Flags that replace fields of the scene's film, or choose what of it is rendered.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Picture")]
+pub struct FilmArguments {
+    /// What linear values depend on.
+    #[command(flatten)]
+    pub values: ValueArguments,
     /// Render this part alone: pixels from the top left corner, X1 and Y1 excluded.
     #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = values::crop, allow_hyphen_values = true)]
     pub crop: Option<Crop>,
     /// How linear values become those of PNG and JPEG.
     #[arg(long, value_name = "CURVE", value_parser = one_of(TRANSFERS))]
     pub transfer: Option<Transfer>,
-    /// When colours are clamped to 1: after every shade (the seed's rule) or when they are written.
-    #[arg(long, value_name = "WHEN", value_parser = one_of(CLAMPS))]
-    pub clamp: Option<Clamp>,
     /// Multiply the picture by 2 to this.
     #[arg(long, value_name = "EV", value_parser = values::exposure, allow_hyphen_values = true)]
     pub exposure: Option<f32>,
@@ -258,7 +273,7 @@ const NORMAL_MODES: [(&str, NormalMode); 3] =
 pub const PRESETS: [(&str, Preset); 3] =
     [("fast", Preset::Fast), ("balanced", Preset::Balanced), ("best", Preset::Best)];
 
-impl FilmArguments {
+impl ValueArguments {
     /// Replaces those fields that were given.
     pub fn apply(&self, film: &mut FilmSettings) {
         if let Some((width, height)) = self.size {
@@ -266,8 +281,15 @@ impl FilmArguments {
         }
         film.samples = self.spp.unwrap_or(film.samples);
         film.max_depth = self.max_depth.unwrap_or(film.max_depth);
-        film.transfer = self.transfer.unwrap_or(film.transfer);
         film.clamp = self.clamp.unwrap_or(film.clamp);
+    }
+}
+
+impl FilmArguments {
+    /// Replaces those fields that were given.
+    pub fn apply(&self, film: &mut FilmSettings) {
+        self.values.apply(film);
+        film.transfer = self.transfer.unwrap_or(film.transfer);
         film.exposure = self.exposure.unwrap_or(film.exposure);
     }
 }

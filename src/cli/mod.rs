@@ -13,6 +13,9 @@ mod commit;
 mod completions;
 mod diff;
 mod doctor;
+mod edit;
+mod explain;
+mod explain_text;
 mod info;
 mod info_text;
 mod ledger;
@@ -59,8 +62,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         Command::Diff(arguments) => diff::run(arguments),
         Command::Check(arguments) => check::run(arguments),
         Command::Query(arguments) => query::run(arguments),
+        Command::Explain(arguments) => explain::run(arguments),
         Command::Report(arguments) => report::run(arguments),
         Command::Bench(arguments) => bench::run(arguments),
+        Command::Edit(arguments) => edit::run(arguments),
         Command::Completions { shell } => completions::run(*shell),
     }
 }

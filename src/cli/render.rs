@@ -53,7 +53,7 @@ pub fn run(arguments: &RenderArguments) -> Result<()> {
     if let Some(crop) = arguments.film.crop {
         check_crop(crop, &scene.film)?;
     }
-    let resized = arguments.film.size.is_some();
+    let resized = arguments.film.values.size.is_some();
     camera::choose(&mut scene, automatic, &arguments.camera, resized)?;
     if let Some(path) = &outputs.scene {
         formats::scene_file::save_model_scene(&scene, &arguments.input, &options, path)?;

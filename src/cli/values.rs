@@ -52,6 +52,12 @@ pub fn crop(text: &str) -> Result<Crop, String> {
     }
 }
 
+/// Reads `X,Y`.
+pub fn pixel(text: &str) -> Result<(u32, u32), String> {
+    let [x, y] = list(text).ok_or("expected X,Y in pixels from the top left corner, such as 320,240")?;
+    Ok((x, y))
+}
+
 /// Reads `AZIMUTH,ELEVATION` in degrees.
 pub fn orbit(text: &str) -> Result<Orbit, String> {
     let [azimuth, elevation]: [f64; 2] = list(text).ok_or("expected AZIMUTH,ELEVATION in degrees, such as 30,20")?;
@@ -170,6 +176,14 @@ mod tests {
         }
         for empty in ["3,2,3,4", "1,4,3,4", "4,0,3,4"] {
             assert!(crop(empty).unwrap_err().contains("nothing lies inside"), "{empty}");
+        }
+    }
+
+    #[test]
+    fn pixels_are_two_whole_numbers() {
+        assert_eq!(pixel("3, 4"), Ok((3, 4)));
+        for bad in ["", "3", "3,4,5", "-1,2", "1.5,2", "3x4"] {
+            assert!(pixel(bad).unwrap_err().contains("such as 320,240"), "{bad}");
         }
     }
 

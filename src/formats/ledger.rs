@@ -75,6 +75,11 @@ impl Ledger {
         self.files.insert(path.to_path_buf());
     }
 
+    /// What was read came from no file.
+    pub fn forget_files(&mut self) {
+        self.files.clear();
+    }
+
     /// All files that were read, once each, sorted.
     pub fn files(&self) -> impl Iterator<Item = &Path> {
         self.files.iter().map(PathBuf::as_path)

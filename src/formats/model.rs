@@ -5,10 +5,11 @@ use std::sync::Arc;
 use glam::{DAffine3, DVec3};
 
 use crate::formats::Ledger;
-use crate::geometry::TriangleMesh;
 use crate::geometry::mesh::Materials;
+use crate::geometry::{Bounds, TriangleMesh};
 use crate::math::transform::{apply, compose};
 use crate::math::vector::length;
+use crate::scene::extent::Extents;
 use crate::scene::{Camera, Light, LightKind, Material, NamedCamera, Object, Projection, Scene, Shape, Texture};
 
 /// What a model file holds. Positions in its lists are local to it; [`Material`]s, [`Texture`]s and meshes are appended
@@ -49,47 +50,84 @@ pub struct Contents {
 impl Model {
     /// Adds everything to a scene; the ledger, with the numbers that meshes and materials have there.
     pub fn append_to(self, scene: &mut Scene) -> Ledger {
-        let (contents, ledger) = self.append_assets(scene);
+        let (contents, ledger) = Imported::new(self).append_assets(scene, &mut Extents::default());
         scene.objects.extend(contents.objects);
         scene.cameras.extend(contents.cameras);
         scene.lights.extend(contents.lights);
         ledger
     }
+}
 
-    /// Adds meshes, materials and textures to a scene and returns what is to be placed in it, and the ledger as
-    /// [`append_to`](Self::append_to) does.
-    pub fn append_assets(self, scene: &mut Scene) -> (Contents, Ledger) {
+/// A model that scenes are given, several of them and again and again: they share its meshes.
+#[derive(Debug, Clone)]
+pub struct Imported {
+    meshes: Vec<Arc<TriangleMesh>>,
+    /// Their boxes.
+    bounds: Vec<Bounds>,
+    /// The number that the first material has in the meshes.
+    first_material: u32,
+    materials: Vec<Material>,
+    textures: Vec<Texture>,
+    contents: Contents,
+    /// What was honoured, approximated and ignored, with the model's own numbers.
+    pub ledger: Ledger,
+}
+
+impl Imported {
+    /// A model's.
+    pub fn new(model: Model) -> Self {
+        let Model { meshes, materials, textures, objects, cameras, lights, physical_lights, ledger } = model;
+        Self {
+            bounds: meshes.iter().map(TriangleMesh::bounds).collect(),
+            meshes: meshes.into_iter().map(Arc::new).collect(),
+            first_material: 0,
+            materials,
+            textures,
+            contents: Contents { objects, cameras, lights, physical_lights },
+            ledger,
+        }
+    }
+
+    /// Adds meshes, materials and textures to a scene, and the meshes' boxes to those of the scene's; what is to be placed in it, and
+    /// the ledger, with the numbers that meshes and materials have there.
+    ///
+    /// Meshes are the same ones as last time if as many materials come before the model's.
+    pub fn append_assets(&mut self, scene: &mut Scene, extents: &mut Extents) -> (Contents, Ledger) {
         let first_mesh = scene.meshes.len() as u32;
         let first_material = scene.materials.len() as u32;
         let first_texture = scene.textures.len() as u32;
-        scene.textures.extend(self.textures);
-        scene.materials.extend(self.materials.into_iter().map(|mut material| {
+        self.number_materials_from(first_material);
+        scene.textures.extend(self.textures.iter().cloned());
+        scene.materials.extend(self.materials.iter().cloned().map(|mut material| {
             material.textures_mut().for_each(|texture| texture.texture += first_texture);
             material
         }));
-        scene.meshes.extend(self.meshes.into_iter().map(|mut mesh| {
-            match &mut mesh.materials {
-                Materials::One(material) => *material += first_material,
-                Materials::PerTriangle(materials) => materials.iter_mut().for_each(|m| *m += first_material),
-            }
-            Arc::new(mesh)
-        }));
-        let objects = self.objects.into_iter().map(|mut object| {
+        scene.meshes.extend(self.meshes.iter().cloned());
+        extents.add(&self.bounds);
+        let mut contents = self.contents.clone();
+        for object in &mut contents.objects {
             if let Shape::Mesh(mesh) = &mut object.shape {
                 *mesh += first_mesh;
             }
             object.material = object.material.map(|material| material + first_material);
-            object
-        });
-        let contents = Contents {
-            objects: objects.collect(),
-            cameras: self.cameras,
-            lights: self.lights,
-            physical_lights: self.physical_lights,
-        };
-        let mut ledger = self.ledger;
+        }
+        let mut ledger = self.ledger.clone();
         ledger.shift(first_material, first_mesh);
         (contents, ledger)
+    }
+
+    fn number_materials_from(&mut self, first: u32) {
+        if self.first_material == first {
+            return;
+        }
+        let shifted = |material: u32| material - self.first_material + first;
+        for mesh in &mut self.meshes {
+            match &mut Arc::make_mut(mesh).materials {
+                Materials::One(material) => *material = shifted(*material),
+                Materials::PerTriangle(each) => each.iter_mut().for_each(|material| *material = shifted(*material)),
+            }
+        }
+        self.first_material = first;
     }
 }
 

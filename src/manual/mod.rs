@@ -8,6 +8,10 @@ pub mod command_line {}
 #[doc = include_str!("conventions.md")]
 pub mod conventions {}
 
+/// The editor, in ten steps.
+#[doc = include_str!("editor.md")]
+pub mod editor {}
+
 /// The numerically hard cases: what each stands for, its truth and its bar.
 #[doc = include_str!("hard_cases.md")]
 pub mod hard_cases {}

@@ -79,7 +79,7 @@ impl ReferenceRenderer {
     /// A degenerate camera, or a crop outside the picture.
     pub fn render(&self, settings: &RenderSettings, progress: &dyn Progress) -> Result<Film> {
         let Self { scene, world, oracle, .. } = self;
-        ray_tracing(scene, world, &Reference { scene, world, oracle }, settings, progress)
+        ray_tracing(scene, world, &Reference { scene, world, oracle }, settings, progress, &|_| ())
     }
 }
 

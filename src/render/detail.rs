@@ -142,10 +142,11 @@ impl<'a, I: Answers> Tracer<'a, I> {
         self.world.instances[hit.instance as usize].has_holes
     }
 
-    /// The first hit of those from `hit` on whose surface is there.
+    /// The first hit of those from `hit` on whose surface is there; `pass` is told of those before it.
     #[inline(never)]
-    pub(super) fn beyond_holes(&self, ray: &I::Ray, direction: DVec3, mut hit: Hit) -> Hit {
+    pub(super) fn beyond_holes(&self, ray: &I::Ray, direction: DVec3, mut hit: Hit, mut pass: impl FnMut(&Hit)) -> Hit {
         while hit.is_hit() && self.has_holes(&hit) && self.is_hole(&hit, direction) {
+            pass(&hit);
             hit = self.intersect.next_hit(ray, hit.key());
         }
         hit

@@ -1,6 +1,7 @@
 //! The two-level intersection: trees over triangles below, a tree over instances and bounded quadrics above,
 //! unbounded quadrics beside it. Here accelerators and scenes meet.
 
+use std::collections::HashMap;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -67,7 +68,7 @@ pub trait Intersect: Sync {
 
 /// A scene's instances over one kind of triangle accelerator.
 pub struct TwoLevel<A> {
-    pub(super) meshes: Vec<A>,
+    pub(super) meshes: Vec<Arc<A>>,
     quadrics: Vec<Quadric>,
     pub(super) world: World,
     pub(super) top: Top,
@@ -116,15 +117,31 @@ impl Filter for Transmissive {
 }
 
 impl<A: TriangleAccelerator> TwoLevel<A> {
-    /// Builds the trees of all meshes and the top level. Advances by one step a live triangle.
+    /// Builds the trees of all meshes and the top level, but for those of meshes that another state of the scene shares, which
+    /// have been built `before`. Advances by one step a live triangle.
     ///
     /// # Errors
     /// A singular transform, or a cancellation.
-    pub fn build(scene: &Scene, params: &Params, progress: &dyn Progress) -> Result<Self> {
+    pub fn build(
+        scene: &Scene,
+        before: Option<(&Scene, &Self)>,
+        params: &Params,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
         let world = World::new(scene)?;
         let instances = &world.instances;
+        let address = |mesh: &Arc<TriangleMesh>| Arc::as_ptr(mesh) as usize;
+        let known: HashMap<usize, &Arc<A>> = before.map_or_else(HashMap::new, |(scene, structure)| {
+            scene.meshes.iter().map(address).zip(&structure.meshes).collect()
+        });
         // Small meshes side by side; what is large is built on all threads by itself, one after the other for the sake of memory.
-        let build = |mesh: &Arc<TriangleMesh>| A::build(mesh, params, progress);
+        let build = |mesh: &Arc<TriangleMesh>| match known.get(&address(mesh)) {
+            Some(&tree) => {
+                progress.advance(mesh.live_count() as u64);
+                Ok(Arc::clone(tree))
+            }
+            None => A::build(mesh, params, progress).map(Arc::new),
+        };
         let is_small = |mesh: &TriangleMesh| mesh.live_count() <= accel::ONE_THREAD;
         let small = scene.meshes.par_iter().map(|mesh| is_small(mesh).then(|| build(mesh)).transpose());
         let small = small.collect::<Result<Vec<_>>>()?;
@@ -149,7 +166,7 @@ impl<A: TriangleAccelerator> TwoLevel<A> {
 
     /// Statistics of the meshes' trees.
     pub fn mesh_stats(&self) -> impl Iterator<Item = TreeStats> + '_ {
-        self.meshes.iter().map(A::stats)
+        self.meshes.iter().map(|mesh| mesh.stats())
     }
 
     /// Bytes of the top level.
@@ -458,7 +475,7 @@ mod tests {
         let mut found = Vec::new();
         for threads in [1, 2, 5] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            let build = || TwoLevel::<Wide>::build(&scene, &Params::default(), &Silent).unwrap();
+            let build = || TwoLevel::<Wide>::build(&scene, None, &Params::default(), &Silent).unwrap();
             let built = pool.install(build);
             assert_eq!(built.validate(), Ok(()));
             found.push(Intersect::closest(&built, &ray));

@@ -11,6 +11,7 @@
 pub mod answers;
 mod chunk;
 mod detail;
+pub mod explain;
 pub mod film;
 pub mod intersect;
 mod points;
@@ -25,10 +26,12 @@ pub mod surface;
 pub mod trace;
 mod two_level_batch;
 mod wave;
+mod witness;
 pub mod world;
 
 pub use answers::Answers;
 pub use film::{Aov, AovKind, Film};
 pub use intersect::Intersect;
+pub use ray_tracing::Tile;
 pub use renderer::{BuildStats, Renderer};
 pub use settings::{Coverage, Crop, RayCounts, RenderSettings, RenderStats, ThreadSeconds};

@@ -24,16 +24,20 @@ const TILE: u32 = 32;
 
 /// Stack of a rendering thread: 16 KiB for each level of the deepest recursion,
 /// [`LARGEST_DEPTH`](crate::scene::film::LARGEST_DEPTH), which a test goes to.
-const STACK: usize = 16 << 20;
+pub(super) const STACK: usize = 16 << 20;
 
 /// The most pixels that are rendered at once: 2^28, which take 6 GiB while tiles are put together.
 const LARGEST_PICTURE: u64 = 1 << 28;
 
 /// One tile's pixels, rows from the top.
-struct Tile {
-    area: Crop,
-    color: Vec<[f32; 3]>,
-    alpha: Vec<f32>,
+#[derive(Debug, Clone)]
+pub struct Tile {
+    /// Where it is in the picture.
+    pub area: Crop,
+    /// Linear colours.
+    pub color: Vec<[f32; 3]>,
+    /// How much of each pixel is covered; empty unless the background is transparent.
+    pub alpha: Vec<f32>,
     aovs: Vec<Vec<f32>>,
     counts: RayCounts,
     seconds: ThreadSeconds,
@@ -41,7 +45,8 @@ struct Tile {
 
 /// Renders the scene through its active camera into a film.
 ///
-/// The picture depends on the scene and its film settings alone. Cancelled work returns the tiles that are finished,
+/// The picture depends on the scene and its film settings alone. `finished` is called for each tile once it is, on the thread that
+/// rendered it. Cancelled work returns the tiles that are finished,
 /// with `complete` false.
 ///
 /// # Errors
@@ -53,6 +58,7 @@ pub fn ray_tracing<I: Answers>(
     intersect: &I,
     settings: &RenderSettings,
     progress: &dyn Progress,
+    finished: &(dyn Fn(&Tile) + Sync),
 ) -> Result<Film> {
     let film = &scene.film;
     film.check()?;
@@ -80,9 +86,10 @@ pub fn ray_tracing<I: Answers>(
     let start = std::time::Instant::now();
     let render_tile = |&tile: &Crop| {
         let tracer = Tracer::new(scene, world, intersect);
-        let finished = tile_pixels(&tracer, &camera, tile, &settings.aovs, counter.as_ref(), progress)?;
+        let tile = tile_pixels(&tracer, &camera, tile, &settings.aovs, counter.as_ref(), progress)?;
+        finished(&tile);
         progress.advance(1);
-        Some(finished)
+        Some(tile)
     };
     let finished: Vec<Option<Tile>> = pool.install(|| tiles.par_iter().map(render_tile).collect());
     let seconds = start.elapsed().as_secs_f64();
@@ -201,13 +208,13 @@ fn block_order(area: Crop) -> Vec<(u32, u32)> {
 }
 
 /// What is known of a pixel.
-struct Pixel {
+pub(super) struct Pixel {
     /// The mean of its samples.
-    color: [f32; 3],
+    pub color: [f32; 3],
     /// The part of them that hit something.
-    alpha: f32,
+    pub alpha: f32,
     /// What the first sample hit.
-    hit: Hit,
+    pub hit: Hit,
 }
 
 /// Renders some pixels and hands them over in order.
@@ -252,12 +259,34 @@ struct Samples<'a, F> {
 
 /// What is known of a pixel's samples so far.
 #[derive(Default)]
-struct Sums {
+pub(super) struct Sums {
     /// In f64, summed in their order.
     color: [f64; 3],
     covered: u32,
     count: u32,
     first: Option<Hit>,
+}
+
+impl Sums {
+    /// Adds what the next sample saw.
+    #[inline(always)]
+    pub fn add(&mut self, color: Rgb, hit: Hit) {
+        for (sum, value) in self.color.iter_mut().zip(color.to_array()) {
+            *sum += f64::from(value);
+        }
+        self.covered += u32::from(hit.is_hit());
+        self.first.get_or_insert(hit);
+        self.count += 1;
+    }
+
+    /// The mean of all.
+    #[inline(always)]
+    pub fn mean(&self) -> Pixel {
+        let samples = f64::from(self.count);
+        let color = self.color.map(|sum| (sum / samples) as f32);
+        let alpha = (f64::from(self.covered) / samples) as f32;
+        Pixel { color, alpha, hit: self.first.unwrap_or(Hit::MISS) }
+    }
 }
 
 impl<F: FnMut(u32, u32, Pixel)> Samples<'_, F> {
@@ -296,20 +325,11 @@ impl<F: FnMut(u32, u32, Pixel)> Samples<'_, F> {
     /// Adds what the next sample saw to its pixel.
     #[inline(always)]
     fn add(&mut self, color: Rgb, hit: Hit) {
-        let pixel = &mut self.pixel;
-        for (sum, value) in pixel.color.iter_mut().zip(color.to_array()) {
-            *sum += f64::from(value);
-        }
-        pixel.covered += u32::from(hit.is_hit());
-        pixel.first.get_or_insert(hit);
-        pixel.count += 1;
-        if pixel.count == self.samples {
+        self.pixel.add(color, hit);
+        if self.pixel.count == self.samples {
             let pixel = std::mem::take(&mut self.pixel);
             let &(x, y) = self.pixels.next().expect("each pixel has as many samples");
-            let samples = f64::from(self.samples);
-            let color = pixel.color.map(|sum| (sum / samples) as f32);
-            let alpha = (f64::from(pixel.covered) / samples) as f32;
-            (self.finished)(x, y, Pixel { color, alpha, hit: pixel.first.unwrap_or(Hit::MISS) });
+            (self.finished)(x, y, pixel.mean());
         }
     }
 }

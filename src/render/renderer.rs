@@ -6,9 +6,10 @@ use crate::accel::{Bvh2, Compact, CwBvh, Linear, Params, Tests, Wide};
 use crate::error::Result;
 use crate::geometry::{Hit, Key, Ray};
 use crate::progress::Progress;
+use crate::render::explain::{self, Explanation, Samples};
 use crate::render::film::Film;
 use crate::render::intersect::{Intersect, TwoLevel};
-use crate::render::ray_tracing::ray_tracing;
+use crate::render::ray_tracing::{Tile, ray_tracing};
 use crate::render::settings::RenderSettings;
 use crate::render::world::World;
 use crate::scene::Scene;
@@ -49,9 +50,21 @@ macro_rules! any_two_level {
         }
 
         impl AnyTwoLevel {
-            fn build(scene: &Scene, params: &Params, progress: &dyn Progress) -> Result<Self> {
+            /// Trees that `before` has of the same meshes, of its scene, are shared.
+            fn build(
+                scene: &Scene,
+                before: Option<(&Scene, &Self)>,
+                params: &Params,
+                progress: &dyn Progress,
+            ) -> Result<Self> {
                 match params.kind.resolve() {
-                    $(crate::accel::Kind::$name => Ok(Self::$name(TwoLevel::build(scene, params, progress)?)),)+
+                    $(crate::accel::Kind::$name => {
+                        let known = match before {
+                            Some((scene, Self::$name(structure))) => Some((scene, structure)),
+                            _ => None,
+                        };
+                        Ok(Self::$name(TwoLevel::build(scene, known, params, progress)?))
+                    })+
                     crate::accel::Kind::Auto => unreachable!("resolve never returns Auto"),
                 }
             }
@@ -75,9 +88,27 @@ impl Renderer {
     /// # Errors
     /// A singular transform, a light without direction, a material that makes light, or a cancellation.
     pub fn build(scene: Scene, params: &Params, progress: &dyn Progress) -> Result<Self> {
+        Self::build_on(scene, None, params, progress)
+    }
+
+    /// [`build`](Self::build) for a scene that is another state of this one's: trees of meshes that both share are not built
+    /// again. `params` must be those of this one.
+    ///
+    /// # Errors
+    /// As `build`.
+    pub fn rebuild(&self, scene: Scene, params: &Params, progress: &dyn Progress) -> Result<Self> {
+        Self::build_on(scene, Some((&self.scene, &self.intersect)), params, progress)
+    }
+
+    fn build_on(
+        scene: Scene,
+        before: Option<(&Scene, &AnyTwoLevel)>,
+        params: &Params,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
         let start = Instant::now();
         progress.begin("build", scene.meshes.iter().map(|mesh| mesh.live_count() as u64).sum());
-        let intersect = AnyTwoLevel::build(&scene, params, progress)?;
+        let intersect = AnyTwoLevel::build(&scene, before, params, progress)?;
         let mut stats = BuildStats {
             accelerator: params.kind.resolve().name().into(),
             seconds: start.elapsed().as_secs_f64(),
@@ -156,8 +187,32 @@ impl Renderer {
     /// # Errors
     /// A degenerate camera, or a crop outside the picture.
     pub fn render(&self, settings: &RenderSettings, progress: &dyn Progress) -> Result<Film> {
+        self.render_tiles(settings, progress, &|_| ())
+    }
+
+    /// [`render`](Self::render), with each tile shown to `finished` once it is, on the thread that rendered it.
+    ///
+    /// # Errors
+    /// As `render`.
+    pub fn render_tiles(
+        &self,
+        settings: &RenderSettings,
+        progress: &dyn Progress,
+        finished: &(dyn Fn(&Tile) + Sync),
+    ) -> Result<Film> {
         with_structure!(&self.intersect, structure => {
-            ray_tracing(&self.scene, structure.world(), structure, settings, progress)
+            ray_tracing(&self.scene, structure.world(), structure, settings, progress, finished)
+        })
+    }
+
+    /// Tells how one pixel of the picture gets its colour: column and row from the top left.
+    ///
+    /// # Errors
+    /// A pixel outside the picture, a sample that it does not have, more than [`explain::MOST_RECORDS`] to tell, a degenerate
+    /// camera, or a cancellation.
+    pub fn explain(&self, x: u32, y: u32, samples: Samples, progress: &dyn Progress) -> Result<Explanation> {
+        with_structure!(&self.intersect, structure => {
+            explain::explain(&self.scene, structure.world(), structure, (x, y), samples, progress)
         })
     }
 

@@ -9,20 +9,50 @@ use crate::math::simd::{Level, Task};
 use crate::math::vector::{dot, is_safe, length, normalize};
 use crate::render::answers::{Answers, Meeting};
 use crate::render::detail::ImagePlace;
+use crate::render::explain::Way;
 use crate::render::points::Points;
 use crate::render::shadow::{Illumination, PreparedLight};
 use crate::render::surface::SurfacePoint;
 use crate::render::trace::{TracedRay, Tracer};
+use crate::render::witness::Witness;
 use crate::scene::camera::ViewRay;
 use crate::scene::{Clamp, Material, Rgb, TextureRef, compiled};
 
 /// A material's terms at a point, textures looked up.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfaceColors {
-    /// Oa, emission included.
+    /// Oa.
     pub ambient: Rgb,
+    /// What the surface emits.
+    pub emission: Rgb,
     /// Od.
     pub diffuse: Rgb,
+}
+
+impl SurfaceColors {
+    /// What is seen without any light.
+    #[inline(always)]
+    pub fn own(&self) -> Rgb {
+        self.ambient + self.emission
+    }
+}
+
+/// What one light adds where all of it arrives, before it is multiplied by the light's colour.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Direct {
+    /// `(1 - kt) Od (N.L)`
+    pub diffuse: Rgb,
+    /// `R.V`, where the material has a highlight.
+    pub r_dot_v: Option<f64>,
+    /// `ks Os (R.V)^n`, where R.V is positive.
+    pub specular: Option<Rgb>,
+}
+
+impl Direct {
+    #[inline(always)]
+    fn sum(&self) -> Rgb {
+        self.specular.map_or(self.diffuse, |specular| self.diffuse + specular)
+    }
 }
 
 /// Where a ray goes that passes through a surface.
@@ -38,51 +68,71 @@ impl<I: Answers> Tracer<'_, I> {
     /// The linear colour of the point that `hit` found along `view`.
     #[doc(alias = "Shade")]
     pub fn shade(&self, view: &ViewRay, hit: &Hit, depth: u32) -> Rgb {
-        self.shade_point(view, hit, &SurfacePoint::of(self.scene, self.world, view, hit), depth)
+        self.shade_point(view, hit, &SurfacePoint::of(self.scene, self.world, view, hit), depth, &mut ())
     }
 
-    /// [`shade`](Self::shade) with the point that was found.
-    pub(super) fn shade_point(&self, view: &ViewRay, hit: &Hit, point: &SurfacePoint, depth: u32) -> Rgb {
+    /// [`shade`](Self::shade) with the point that was found, while someone looks on.
+    pub(super) fn shade_point(
+        &self,
+        view: &ViewRay,
+        hit: &Hit,
+        point: &SurfacePoint,
+        depth: u32,
+        witness: &mut impl Witness,
+    ) -> Rgb {
         let material = &*self.terms(point, hit);
         let colors = self.material_colors(material, || (*point, *hit));
         let here = Meeting { view, hit, point };
 
         // Ambient, then each light: diffuse and highlight.
-        let mut color = colors.ambient;
-        for light in self.lights() {
-            let Some(illumination) = Illumination::at(light, point) else { continue };
-            let visible = self.visibility(&here, &illumination);
+        witness.begins_sum(&colors);
+        let mut color = colors.own();
+        for (number, light) in self.lights().iter().enumerate() {
+            let Some(illumination) = Illumination::at(light, point) else {
+                witness.is_dark(number, || light.darkness(point));
+                continue;
+            };
+            witness.shines(number, &illumination, || self.direct(&illumination, material, colors.diffuse, point, view));
+            let visible = self.watch_visibility(&here, &illumination, witness);
+            witness.arrives(visible);
             if visible != Rgb::ZERO {
                 color += self.lit(visible, &illumination, material, colors.diffuse, point, view);
             }
         }
 
         // Mirror and transmission.
-        if depth < self.scene.film.max_depth {
-            if compiled::REFLECTION && material.is_reflective() {
-                color += material.kr * self.trace(&self.reflected(&here), depth + 1);
+        let goes_on = depth < self.scene.film.max_depth && witness.has_room();
+        if compiled::REFLECTION && material.is_reflective() {
+            witness.branches(|| Way::Reflected, material.kr);
+            if goes_on {
+                color += material.kr * self.follow(&self.reflected(&here), depth + 1, witness).0;
             }
-            if !self.is_opaque() && material.is_transmissive() {
-                color += material.kt * self.trace(&self.transmitted(&here, material), depth + 1);
+        }
+        if !self.is_opaque() && material.is_transmissive() {
+            witness.branches(|| way_through(&here, material), material.kt);
+            if goes_on {
+                color += material.kt * self.follow(&self.transmitted(&here, material), depth + 1, witness).0;
             }
         }
 
-        self.clamp(self.after_way_inside(color, material, point, view))
+        // What the ray came through, and the seed's clamp.
+        if let Some((length, left)) = self.way_inside(material, point, view) {
+            witness.absorbs(length, left);
+            color *= left;
+        }
+        let clamped = self.clamp(color);
+        witness.clamps(color, clamped);
+        clamped
     }
 
-    /// What is left of a colour at the end of a ray's way, which may have led through what absorbs.
+    /// How far a ray came through what absorbs, and what that left of the light; `None` where nothing absorbs.
     #[inline(always)]
-    pub(super) fn after_way_inside(
-        &self,
-        color: Rgb,
-        material: &Material,
-        point: &SurfacePoint,
-        view: &ViewRay,
-    ) -> Rgb {
+    pub(super) fn way_inside(&self, material: &Material, point: &SurfacePoint, view: &ViewRay) -> Option<(f64, Rgb)> {
         if point.from_outside || !material.is_absorbing() {
-            return color;
+            return None;
         }
-        color * material.left_after(length(point.position - view.origin))
+        let length = length(point.position - view.origin);
+        Some((length, material.left_after(length)))
     }
 
     /// What is done to a colour after each Shade.
@@ -112,11 +162,28 @@ impl<I: Answers> Tracer<'_, I> {
         point: &SurfacePoint,
         view: &ViewRay,
     ) -> Rgb {
-        if self.is_opaque() {
-            return illumination.color * direct(material, diffuse, point, view, illumination);
+        let direct = self.direct(illumination, material, diffuse, point, view).sum();
+        if self.is_opaque() { illumination.color * direct } else { visible * illumination.color * direct }
+    }
+
+    /// The diffuse and specular terms of a light.
+    #[inline(always)]
+    fn direct(
+        &self,
+        illumination: &Illumination,
+        material: &Material,
+        diffuse: Rgb,
+        point: &SurfacePoint,
+        view: &ViewRay,
+    ) -> Direct {
+        let diffuse = if self.is_opaque() { diffuse } else { (Rgb::ONE - material.kt) * diffuse };
+        let r_dot_v = (material.ks != Rgb::ZERO)
+            .then(|| r_dot_v(illumination.n_dot_l, point.normal, illumination.to_light, view.direction));
+        Direct {
+            diffuse: diffused(diffuse, illumination.n_dot_l),
+            r_dot_v,
+            specular: r_dot_v.filter(|&r_dot_v| r_dot_v > 0.0).map(|r_dot_v| glossy(material, r_dot_v)),
         }
-        let diffuse = (Rgb::ONE - material.kt) * diffuse;
-        visible * illumination.color * direct(material, diffuse, point, view, illumination)
     }
 
     /// Whether nothing in the scene lets light through.
@@ -146,7 +213,7 @@ impl<I: Answers> Tracer<'_, I> {
             _ => material.diffuse,
         };
         let ambient = material.ambient.unwrap_or(self.scene.ambient * diffuse * material.coverage);
-        SurfaceColors { ambient: ambient + material.emission, diffuse }
+        SurfaceColors { ambient, emission: material.emission, diffuse }
     }
 
     /// What an image has at a point. Out of line, since scenes without images need not pay.
@@ -177,17 +244,12 @@ impl<I: Answers> Tracer<'_, I> {
     }
 }
 
-/// `D (N.L) + ks Os (R.V)^n` for one light, where D is `(1 - kt) Od`.
-#[inline(always)]
-fn direct(material: &Material, diffuse: Rgb, point: &SurfacePoint, view: &ViewRay, illumination: &Illumination) -> Rgb {
-    let mut sum = diffused(diffuse, illumination.n_dot_l);
-    if material.ks != Rgb::ZERO {
-        let r_dot_v = r_dot_v(illumination.n_dot_l, point.normal, illumination.to_light, view.direction);
-        if r_dot_v > 0.0 {
-            sum += glossy(material, r_dot_v);
-        }
+/// Whether a ray that meets a surface goes through it or is reflected within.
+fn way_through(here: &Meeting<'_>, material: &Material) -> Way {
+    match refract(here.point, f64::from(material.ior), here.view.direction) {
+        Refraction::Through(_) => Way::Refracted,
+        Refraction::Total => Way::TotalReflection,
     }
-    sum
 }
 
 /// `R.V`

@@ -3,13 +3,16 @@
 use glam::DVec3;
 
 use crate::error::{Error, Result};
+use crate::geometry::Hit;
 use crate::math::lanes::{Flags, LANES, Numbers, Vectors, Vectors32, whole_rows};
 use crate::math::simd::{Level, Task};
 use crate::math::vector::{dot, is_safe, length, normalize};
 use crate::render::answers::{Answers, Meeting};
+use crate::render::explain::Dark;
 use crate::render::points::Points;
 use crate::render::surface::SurfacePoint;
 use crate::render::trace::Tracer;
+use crate::render::witness::Witness;
 use crate::scene::{Falloff, Light, LightKind, Rgb};
 
 /// The light that would reach a point if nothing stood between.
@@ -44,6 +47,17 @@ struct Cone {
     /// Cosines of the angles within which it is as bright as anywhere, and beyond which there is no light.
     inner: f64,
     outer: f64,
+}
+
+impl Cone {
+    /// How bright the light is along a unit vector to it, from 0 to 1; and whether the vector lies within the cone.
+    #[inline(always)]
+    fn share(&self, to_light: DVec3) -> (f64, bool) {
+        // glTF's KHR_lights_punctual: the square of a linear ramp in the cosine.
+        let cosine = -dot(to_light, self.axis);
+        let share = (cosine - self.outer) / (self.inner - self.outer);
+        (if cosine >= self.inner { 1.0 } else { share * share }, (cosine >= self.inner) | (share > 0.0))
+    }
 }
 
 impl PreparedLight {
@@ -104,12 +118,10 @@ impl PreparedLight {
             Falloff::InverseSquare => 1.0 / squared,
         };
         let mut shines = true;
-        if let Some(Cone { axis, inner, outer }) = self.cone {
-            // glTF's KHR_lights_punctual: the square of a linear ramp in the cosine.
-            let cosine = -dot(to_light, axis);
-            let share = (cosine - outer) / (inner - outer);
-            strength *= if cosine >= inner { 1.0 } else { share * share };
-            shines = (cosine >= inner) | (share > 0.0);
+        if let Some(cone) = self.cone {
+            let (share, is_within) = cone.share(to_light);
+            strength *= share;
+            shines = is_within;
         }
         let n_dot_l = dot(normal, to_light);
         let color = (self.color * strength).as_vec3();
@@ -131,6 +143,23 @@ impl Illumination {
         let to_light = if light.is_distant { offset } else { normalize(offset)? };
         let (n_dot_l, color, is_lit) = light.shine(to_light, dot(offset, offset), point.normal);
         is_lit.then_some(Self { to_light, n_dot_l, color, position: light.position() })
+    }
+}
+
+impl PreparedLight {
+    /// Why [`Illumination::at`] gives nothing at a point where it does.
+    pub(super) fn darkness(&self, point: &SurfacePoint) -> Dark {
+        let (offset, is_apart) = self.offset(point.position);
+        let to_light = if self.is_distant { Some(offset) } else { normalize(offset) };
+        let Some(to_light) = to_light.filter(|_| is_apart) else { return Dark::AtThePoint };
+        let (n_dot_l, ..) = self.shine(to_light, dot(offset, offset), point.normal);
+        if !(n_dot_l > 0.0) {
+            return Dark::Behind { n_dot_l };
+        }
+        match self.cone {
+            Some(cone) if !cone.share(to_light).1 => Dark::OutsideCone,
+            _ => Dark::TooBright,
+        }
     }
 }
 
@@ -243,16 +272,42 @@ impl<I: Answers> Tracer<'_, I> {
     /// Si, per channel: 0 where an opaque surface blocks the light, the product of kt over the surfaces crossed, in
     /// the order of hits, where they let light through, else 1.
     pub fn visibility(&self, from: &Meeting<'_>, illumination: &Illumination) -> Rgb {
+        self.watch_visibility(from, illumination, &mut ())
+    }
+
+    /// The same while someone looks on.
+    pub(super) fn watch_visibility(
+        &self,
+        from: &Meeting<'_>,
+        illumination: &Illumination,
+        witness: &mut impl Witness,
+    ) -> Rgb {
         let ray = self.intersect.shadow_ray(from, illumination);
         self.count(|counts| counts.shadow += 1);
         if self.intersect.is_blocked_by_opaque(&ray) {
+            witness.is_blocked(|| self.first_opaque(&ray));
             return Rgb::ZERO;
         }
-        self.visible_through(&ray, from.point, illumination)
+        self.visible_through(&ray, from.point, illumination, witness)
+    }
+
+    /// The first hit on what is opaque as a whole.
+    fn first_opaque(&self, ray: &I::Ray) -> Hit {
+        let mut hit = self.intersect.first_hit(ray);
+        while hit.is_hit() && !self.world.instances[hit.instance as usize].opaque {
+            hit = self.intersect.next_hit(ray, hit.key());
+        }
+        hit
     }
 
     /// The same for a shadow ray from a point that nothing opaque blocks.
-    pub(super) fn visible_through(&self, ray: &I::Ray, from: &SurfacePoint, illumination: &Illumination) -> Rgb {
+    pub(super) fn visible_through(
+        &self,
+        ray: &I::Ray,
+        from: &SurfacePoint,
+        illumination: &Illumination,
+        witness: &mut impl Witness,
+    ) -> Rgb {
         let mut visible = Rgb::ONE;
         if self.is_opaque() {
             return visible;
@@ -261,13 +316,18 @@ impl<I: Answers> Tracer<'_, I> {
         let scale = illumination.position.map_or(1.0, |position| length(position - from.position));
         let mut before = 0.0;
         self.intersect.visit_transmissive(ray, |hit| {
-            visible *= self.passes(hit, -illumination.to_light);
+            let passes = self.passes(hit, -illumination.to_light);
+            witness.crosses(hit, passes);
+            visible *= passes;
             let material = self.material_hit(hit);
             if material.is_absorbing() {
                 let t = f64::from(hit.t);
                 // What comes out of a solid went through it since it came in, or began inside.
                 if self.is_from_inside(hit, illumination.to_light) {
-                    visible *= material.left_after((t - before) * scale);
+                    let length = (t - before) * scale;
+                    let left = material.left_after(length);
+                    witness.absorbs_light(length, left);
+                    visible *= left;
                 }
                 before = t;
             }

@@ -7,9 +7,10 @@ use glam::{DVec2, DVec3};
 
 use crate::geometry::{Hit, Ray};
 use crate::math::vector::dot;
-use crate::render::answers::Answers;
+use crate::render::answers::{Answers, Meeting};
 use crate::render::settings::{RayCounts, ThreadSeconds};
 use crate::render::surface::SurfacePoint;
+use crate::render::witness::Witness;
 use crate::render::world::World;
 use crate::scene::camera::ViewRay;
 use crate::scene::{Background, Rgb, Scene};
@@ -54,25 +55,41 @@ impl<'a, I: Answers> Tracer<'a, I> {
     /// The nearest hit is shaded; a ray that hits nothing sees the background.
     #[doc(alias = "Trace")]
     pub fn trace(&self, ray: &TracedRay<I::Ray>, depth: u32) -> Rgb {
-        self.trace_hit(ray, depth).0
+        self.trace_hit(ray, depth, &mut ()).0
     }
 
     /// What a camera ray sees and what it hit.
     pub fn trace_camera(&self, view: ViewRay) -> (Rgb, Hit) {
-        self.count(|counts| counts.camera += 1);
-        self.trace_hit(&TracedRay { ray: self.intersect.camera_ray(&view), view }, 0)
+        self.watch_camera(view, &mut ())
     }
 
-    fn trace_hit(&self, ray: &TracedRay<I::Ray>, depth: u32) -> (Rgb, Hit) {
-        let mut hit = self.intersect.first_hit(&ray.ray);
+    /// The same while someone looks on.
+    pub(super) fn watch_camera(&self, view: ViewRay, witness: &mut impl Witness) -> (Rgb, Hit) {
+        self.count(|counts| counts.camera += 1);
+        self.follow(&TracedRay { ray: self.intersect.camera_ray(&view), view }, 0, witness)
+    }
+
+    /// What a ray that sets out sees and what it hit.
+    pub(super) fn follow(&self, ray: &TracedRay<I::Ray>, depth: u32, witness: &mut impl Witness) -> (Rgb, Hit) {
+        witness.begins(&ray.view, depth);
+        let (color, hit) = self.trace_hit(ray, depth, witness);
+        witness.ends(color);
+        (color, hit)
+    }
+
+    fn trace_hit(&self, ray: &TracedRay<I::Ray>, depth: u32, witness: &mut impl Witness) -> (Rgb, Hit) {
+        let mut found = self.intersect.first_hit(&ray.ray);
         if self.world.has_holes {
-            hit = self.beyond_holes(&ray.ray, ray.view.direction, hit);
+            found = self.beyond_holes(&ray.ray, ray.view.direction, found, |hole| witness.passes_hole(hole));
         }
-        if !hit.is_hit() {
-            return (background(&self.scene.background, ray.view.direction), hit);
+        if !found.is_hit() {
+            let color = background(&self.scene.background, ray.view.direction);
+            witness.sees_background(color);
+            return (color, found);
         }
-        let (hit, point) = self.meet(ray, hit);
-        (self.shade_point(&ray.view, &hit, &point, depth), hit)
+        let (hit, point) = self.meet(ray, found);
+        witness.meets(&found, &Meeting { view: &ray.view, hit: &hit, point: &point });
+        (self.shade_point(&ray.view, &hit, &point, depth, witness), hit)
     }
 
     /// The surface that a ray comes upon where `hit` was found first, and where.

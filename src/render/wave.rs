@@ -99,7 +99,7 @@ impl<I: Answers> Tracer<'_, I> {
         self.timed(traversal, || self.intersect.first_hits(&traced.rays, &mut hits));
         if self.world.has_holes {
             for ((hit, ray), view) in hits.iter_mut().zip(&traced.rays).zip(&traced.views) {
-                *hit = self.beyond_holes(ray, view.direction, *hit);
+                *hit = self.beyond_holes(ray, view.direction, *hit, |_| ());
             }
         }
         let mut colors = vec![Rgb::ZERO; hits.len()];
@@ -216,7 +216,7 @@ impl<I: Answers> Tracer<'_, I> {
                     colors
                 }
             };
-            block.color.set(at, colors.ambient);
+            block.color.set(at, colors.own());
             block.diffuse.set(at, colors.diffuse);
         }
     }
@@ -228,7 +228,7 @@ impl<I: Answers> Tracer<'_, I> {
             return Rgb::ONE;
         }
         let view = &views[block.found.rays[at] as usize];
-        self.after_way_inside(Rgb::ONE, block.material(self.scene, at), &block.points.get(at), view)
+        self.way_inside(block.material(self.scene, at), &block.points.get(at), view).map_or(Rgb::ONE, |(_, left)| left)
     }
 
     /// Adds the mirror rays of a block's points to the next rays, and tells which have one.
@@ -298,7 +298,7 @@ impl<I: Answers> Tracer<'_, I> {
     fn add_through(&self, ray: &I::Ray, at: usize, views: &[ViewRay], block: &mut Block, from: &Illuminations) {
         let Some(illumination) = from.get(at) else { return };
         let (point, view) = (block.points.get(at), &views[block.found.rays[at] as usize]);
-        let visible = self.visible_through(ray, &point, &illumination);
+        let visible = self.visible_through(ray, &point, &illumination, &mut ());
         if visible != Rgb::ZERO {
             let material = block.material(self.scene, at);
             let more = self.lit(visible, &illumination, material, block.diffuse.get(at), &point, view);

@@ -25,15 +25,12 @@ pub struct Extents {
 impl Extents {
     /// The boxes of all meshes.
     pub fn of(scene: &Scene) -> Self {
-        let mut extents = Self::default();
-        extents.add_new(scene);
-        extents
+        Self { meshes: scene.meshes.iter().map(|mesh| mesh.bounds()).collect() }
     }
 
-    /// Adds the boxes of those meshes that the scene gained since.
-    pub fn add_new(&mut self, scene: &Scene) {
-        let known = self.meshes.len();
-        self.meshes.extend(scene.meshes[known..].iter().map(|mesh| mesh.bounds()));
+    /// Adds the boxes of meshes that the scene gained.
+    pub fn add(&mut self, boxes: &[Bounds]) {
+        self.meshes.extend(boxes);
     }
 
     /// The corners of the box around what the object shows, in the file's coordinates; `None` if that is nothing or goes

@@ -3,12 +3,16 @@
 use glam::{DVec2, DVec3, DVec4, Mat4};
 
 use crate::error::{Error, Result};
-use crate::math::vector::{cross, dot, normalize};
+use crate::math::vector::{cross, dot, length, normalize};
 use crate::scene::{Camera, Projection};
 
 /// The nearest that is seen, as a share of the farthest: a depth buffer of 24 bits then tells apart what differs by a
 /// 300th of its distance where it is farthest, and by ever less towards the eye.
 const NEAREST_SHARE: f64 = 2e-5;
+
+/// The same as a share of the distance to what the camera looks at, where that is more: there the buffer then tells apart what
+/// differs by a 100000th of its distance.
+const NEAREST_TO_FOCUS: f64 = 5e-3;
 
 /// A camera and the size of its picture in pixels, in the file's coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,6 +33,8 @@ pub struct View {
     height: f64,
     /// The depths between which there is something.
     depths: (f64, f64),
+    /// How far away is what the camera looks at.
+    focus: f64,
 }
 
 /// A point in a picture.
@@ -80,6 +86,10 @@ impl View {
                 width,
                 height,
                 depths: (NEAREST_SHARE, 1.0),
+                focus: match *camera {
+                    Camera::LookAt { eye, target, .. } => length(target - eye),
+                    Camera::FourPoint { viewpoint, lower_left, .. } => length(lower_left - viewpoint),
+                },
             }),
             _ => Err(Error::caller("the camera's viewpoint lies in the plane of its picture")),
         }
@@ -96,7 +106,8 @@ impl View {
         }
         // A little more on both sides, so that what lies in a side of the box is seen.
         let margin = 1e-3;
-        let least = if self.is_parallel { 0.0 } else { far * NEAREST_SHARE };
+        let nearest = (far * NEAREST_SHARE).max(far.min(self.focus) * NEAREST_TO_FOCUS);
+        let least = if self.is_parallel { 0.0 } else { nearest };
         self.depths = ((near - far * margin).max(least), far * (1.0 + margin));
         self
     }

@@ -173,7 +173,7 @@ mod tests {
             DVec4::new(0.0, 0.0, 1.0, 0.0),
             DVec4::W,
         ];
-        sift(&piece, &[0..3], rows, (10.0, 10.0), sides).len()
+        sift(&piece, std::slice::from_ref(&(0..3)), rows, (10.0, 10.0), sides).len()
     }
 
     #[test]

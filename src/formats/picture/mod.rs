@@ -22,8 +22,8 @@ use rayon::prelude::*;
 use crate::error::{Error, Fault, Result};
 use crate::formats::atomic_file::{Sink, write_atomically};
 use crate::render::Film;
-use crate::scene::Transfer;
 use crate::scene::quantize::byte;
+use crate::scene::{FilmSettings, Transfer};
 
 /// At this quality the loss is hard to see, and files are a third of those at 100.
 const JPEG_QUALITY: u8 = 95;
@@ -110,8 +110,25 @@ pub fn write_png(film: &Film, out: &mut impl Write) -> Result<()> {
     out.write_all(bytes.get_ref()).and_then(|()| out.flush()).map_err(cannot_write)
 }
 
+/// What the film's values are multiplied by when they are written.
+pub fn exposure_factor(settings: &FilmSettings) -> f32 {
+    libm::exp2(f64::from(settings.exposure)) as f32
+}
+
+/// A pixel as formats of bytes have it, not weighted by alpha, given [`exposure_factor`].
+pub fn pixel_bytes(color: &[f32; 3], alpha: Option<f32>, exposure: f32, transfer: Transfer) -> [u8; 4] {
+    // Films hold colours that are already weighted by alpha, as EXR does; these formats do not.
+    let weight = match alpha {
+        None => exposure,
+        Some(alpha) if alpha > 0.0 => exposure / alpha,
+        Some(_) => 0.0,
+    };
+    let [r, g, b] = color.map(|value| byte(value * weight, transfer));
+    [r, g, b, alpha.map_or(255, |alpha| byte(alpha, Transfer::Linear))]
+}
+
 fn write(film: &Film, format: PictureFormat, mut out: &mut dyn Sink) -> Result<()> {
-    let exposure = libm::exp2(f64::from(film.settings.exposure)) as f32;
+    let exposure = exposure_factor(&film.settings);
     match format {
         PictureFormat::Png => encode_bytes(
             film,
@@ -151,14 +168,9 @@ fn rgb_bytes(film: &Film, exposure: f32) -> Vec<u8> {
     film.color.par_iter().map(pixel).collect::<Vec<_>>().into_flattened()
 }
 
-/// Colours with alpha. Films hold colours that are already weighted by alpha, as EXR does; these formats do not.
 fn rgba_bytes(film: &Film, alpha: &[f32], exposure: f32) -> Vec<u8> {
     let transfer = film.settings.transfer;
-    let pixel = |(color, &alpha): (&[f32; 3], &f32)| {
-        let weight = if alpha > 0.0 { exposure / alpha } else { 0.0 };
-        let [r, g, b] = color.map(|value| byte(value * weight, transfer));
-        [r, g, b, byte(alpha, Transfer::Linear)]
-    };
+    let pixel = |(color, &alpha): (&[f32; 3], &f32)| pixel_bytes(color, Some(alpha), exposure, transfer);
     film.color.par_iter().zip(alpha).map(pixel).collect::<Vec<_>>().into_flattened()
 }
 

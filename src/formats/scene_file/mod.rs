@@ -3,6 +3,7 @@
 //! The format is described in the manual's page on it. Every mistake is an error with line and column; nothing is
 //! skipped in silence.
 
+mod assets;
 mod light;
 mod material;
 mod object;
@@ -15,5 +16,7 @@ mod value;
 mod view;
 mod write;
 
-pub use read::{parse, read};
-pub use write::save_model_scene;
+pub use assets::{Assets, builtin_names};
+pub use read::{Parsed, parse, parse_with, read};
+pub use transform::parse_transform;
+pub use write::{camera_text, light_text, model_scene, save_model_scene};

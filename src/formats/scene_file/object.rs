@@ -31,10 +31,12 @@ pub fn read_object(fields: &Fields<'_>, number: usize, reader: &mut Reader<'_>) 
     let name = fields.get("name").map(|value| reader.claim_name("object", &value)).transpose()?;
     let material = fields.get("material").map(|value| reader.material(&value)).transpose()?;
     let places = read_places(fields, &shape)?;
-    let contents = if key == "mesh" {
-        fields.accept(&[&["mesh"], &MESH_FIELDS[..]].concat())?;
+    let is_visible = fields.or("visible", true, Value::boolean)?;
+    let is_builtin = key == "builtin";
+    let contents = if is_builtin || key == "mesh" {
+        fields.accept(&[&[key], &MESH_FIELDS[..]].concat())?;
         let options = read_load_options(fields, reader.options())?;
-        let mut contents = reader.model(&shape, &options)?;
+        let mut contents = reader.model(&shape, is_builtin, &options)?;
         for object in &mut contents.objects {
             object.name = joined_name(name, &object.name);
             object.material = material.or(object.material);
@@ -51,20 +53,25 @@ pub fn read_object(fields: &Fields<'_>, number: usize, reader: &mut Reader<'_>) 
     };
     reader.check_extent(&contents.objects, &format!("the shape `{key}`"), &shape)?;
     for (index, (place, culprit)) in places.iter().enumerate() {
-        reader.place(contents.clone(), place, (places.len() > 1).then_some(index + 1), culprit)?;
+        let number = (places.len() > 1).then_some(index + 1);
+        let placed = reader.placed(contents.clone(), place, number, culprit)?;
+        if is_visible {
+            reader.add(placed);
+        }
     }
     Ok(())
 }
 
 /// What objects have beside a shape that is a quadric.
-const QUADRIC_FIELDS: [&str; 4] = ["name", "material", "transform", "instances"];
+const QUADRIC_FIELDS: [&str; 5] = ["name", "material", "transform", "instances", "visible"];
 
-/// What objects have beside `mesh`.
-const MESH_FIELDS: [&str; 11] = [
+/// What objects have beside `mesh` or `builtin`.
+const MESH_FIELDS: [&str; 12] = [
     "name",
     "material",
     "transform",
     "instances",
+    "visible",
     "normals",
     "up",
     "crease_angle",

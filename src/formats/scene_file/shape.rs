@@ -10,8 +10,9 @@ use crate::geometry::shapes;
 use crate::math::vector::{basis, length, normalize};
 
 /// The keys that give an object's shape.
-pub const SHAPES: [&str; 11] = [
+pub const SHAPES: [&str; 12] = [
     "mesh",
+    "builtin",
     "sphere",
     "ellipsoid",
     "cylinder",
@@ -27,7 +28,7 @@ pub const SHAPES: [&str; 11] = [
 /// A quadric and the transform from its canonical space to the object's.
 pub type PlacedQuadric = (Quadric, DAffine3);
 
-/// The quadric that `key`, one of [`SHAPES`] but `mesh`, describes.
+/// The quadric that `key`, one of [`SHAPES`] but `mesh` and `builtin`, describes.
 ///
 /// # Errors
 /// The first mistake, and radii and heights below 2^-40: in units of theirs the rest of the shape may be beyond what

@@ -1,11 +1,12 @@
 //! Scene files as people write them, right and wrong.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use glam::DVec3;
 
 use super::read::parse;
-use super::save_model_scene;
+use super::{Assets, builtin_names, parse_with, save_model_scene};
 use crate::error::Result;
 use crate::formats::{self, LoadOptions, Loaded, NormalMode, UpAxis};
 use crate::progress::Silent;
@@ -44,7 +45,7 @@ const MISTAKES: &[(&str, &str)] = &[
     ),
     (
         "[[object]]\nsphere = {}\nnormals = \"flat\"",
-        "3:1: unknown key `normals` of an object; accepted are `sphere`, `name`, `material`, `transform`, `instances`",
+        "3:1: unknown key `normals` of an object; accepted are `sphere`, `name`, `material`, `transform`, `instances`, `visible`",
     ),
     ("[camera]\neye = [0, 0, 1]", "1:1: a camera needs `target`"),
     ("\n\n[[light]]\nposition = [0, 0, 0]", "3:1: a light needs `kind`"),
@@ -120,7 +121,7 @@ const MISTAKES: &[(&str, &str)] = &[
     // Objects.
     (
         "[[object]]\nname = \"a\"",
-        "1:1: an object needs a shape; one of `mesh`, `sphere`, `ellipsoid`, `cylinder`, `cone`, `paraboloid`, \
+        "1:1: an object needs a shape; one of `mesh`, `builtin`, `sphere`, `ellipsoid`, `cylinder`, `cone`, `paraboloid`, \
         `hyperboloid_one_sheet`, `hyperboloid_two_sheets`, `saddle`, `plane`, `quadric`",
     ),
     (
@@ -370,10 +371,11 @@ fn meshes_are_shared_replaced_and_overridden() {
     assert_eq!(shapes, [Shape::Mesh(0), Shape::Mesh(0), Shape::Mesh(1)], "loaded once for each way of reading it");
     assert_eq!(scene.objects[0].name, "first/m");
     assert_eq!(scene.objects[1].transform.translation, DVec3::Z * 4.0);
-    assert_eq!((scene.objects[0].material, scene.objects[1].material), (None, Some(1)));
+    let own = scene.materials.iter().position(|material| material.name == "mine").unwrap() as u32;
+    assert_eq!((scene.objects[0].material, scene.objects[1].material), (None, Some(own)));
     assert!(scene.meshes[0].normals.is_none() && scene.meshes[1].normals.is_some());
 
-    let mine = scene.materials[1].diffuse_texture.unwrap();
+    let mine = scene.materials.iter().find(|m| m.name == "mine").unwrap().diffuse_texture.unwrap();
     let texture = &scene.textures[mine.texture as usize];
     assert_eq!((texture.wrap, texture.filter), ([Wrap::Clamp, Wrap::Repeat], Filter::Nearest));
     assert_eq!(
@@ -570,6 +572,61 @@ fn formats_are_told_by_suffix_and_content_and_others_are_refused_with_a_list() {
     assert!(message.ends_with(expected), "{message}");
     assert!(opened(&folder, "none.obj").unwrap_err().to_string().ends_with("none.obj: there is no such file"));
     assert!(opened(&folder, ".").unwrap_err().to_string().contains("is a folder; name a scene or model file in it"));
+}
+
+#[test]
+fn built_in_meshes_need_no_file() {
+    let names: Vec<_> = builtin_names().collect();
+    assert_eq!(names, ["box", "icosphere", "torus", "teapot"]);
+    let folder = folder_with("");
+    for name in names {
+        let text = format!("[[object]]\nbuiltin = \"{name}\"\nnormals = \"smooth\"\n");
+        let loaded = parse(&text, &folder.path().join("s.toml"), &LoadOptions::default(), &Silent).unwrap();
+        assert_eq!((loaded.scene.objects.len(), loaded.scene.meshes[0].normals.is_some()), (1, true), "{name}");
+        assert_eq!(loaded.ledger.files().count(), 1, "{name}: the scene file alone");
+    }
+    let wrong = parse("[[object]]\nbuiltin = \"teepot\"\n", Path::new("s.toml"), &LoadOptions::default(), &Silent);
+    let message = wrong.unwrap_err().to_string();
+    assert!(message.contains("s.toml:2:11") && message.contains("did you mean `teapot`?"), "{message}");
+}
+
+#[test]
+fn what_is_not_visible_is_read_and_left_out() {
+    let folder = folder_with(
+        "[[object]]\nmesh = \"m.obj\"\nname = \"a\"\nvisible = false\n\
+         [[object]]\nsphere = {}\nname = \"b\"\nvisible = true\n\
+         [[object]]\nplane = {}\nvisible = false\ninstances = [{ scale = 1 }, { scale = 2 }]\n\
+         [[override]]\nmaterial = \"red\"\nkr = 0.5\n",
+    );
+    let scene = opened(&folder, "s.toml").unwrap().scene;
+    assert_eq!(scene.objects.iter().map(|object| object.name.as_str()).collect::<Vec<_>>(), ["b"]);
+    let folder = folder_with("[[object]]\nmesh = \"none.obj\"\nvisible = false\n");
+    assert!(opened(&folder, "s.toml").unwrap_err().to_string().contains("`none.obj` is not there"));
+}
+
+#[test]
+fn a_scene_read_again_shares_what_has_not_changed() {
+    let text = "[[object]]\nmesh = \"m.obj\"\n[[object]]\nsphere = {}\n[[object]]\nmesh = \"m.obj\"\n";
+    let folder = folder_with(text);
+    let mut assets = Assets::default();
+    let mut read = |text: &str| {
+        parse_with(text, &folder.path().join("s.toml"), &LoadOptions::default(), &mut assets, &Silent).unwrap()
+    };
+    let first = read(text);
+    assert_eq!(first.entries, [0, 1, 2]);
+    let second = read(&format!("[[material]]\nname = \"new\"\ntexture = \"t.png\"\n{text}material = \"new\"\n"));
+    let (a, b) = (&first.loaded.scene, &second.loaded.scene);
+    assert!(Arc::ptr_eq(&a.meshes[0], &b.meshes[0]), "a material of the scene's does not change meshes");
+    let image = |scene: &Scene| {
+        let blue = scene.materials.iter().find(|material| material.name == "blue").unwrap();
+        scene.textures[blue.diffuse_texture.unwrap().texture as usize].name.clone()
+    };
+    assert_eq!(image(a), image(b));
+    assert_eq!(b.materials[b.objects[2].material.unwrap() as usize].name, "new");
+    assert_eq!((second.imported_materials, b.materials.len()), (a.materials.len(), a.materials.len() + 1));
+
+    std::fs::write(folder.path().join("m.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    assert_eq!(read(text).loaded.scene.meshes[0].indices.len(), 1, "a file that changed is read again");
 }
 
 /// Every block of the manual's page that is marked as TOML is a whole scene file.

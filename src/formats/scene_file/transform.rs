@@ -1,9 +1,12 @@
 //! `transform` and `instances`: where objects stand.
 
+use std::path::Path;
+
 use glam::{DAffine3, DMat3, DVec3};
+use toml::de::DeTable;
 
 use crate::error::Result;
-use crate::formats::scene_file::value::Value;
+use crate::formats::scene_file::value::{Fields, Source, Value};
 use crate::math::Transform;
 use crate::math::transform::{compose, rotation_about, rotation_xyz};
 use crate::math::vector::normalize;
@@ -61,4 +64,14 @@ fn read_matrix(value: &Value<'_>) -> Result<DAffine3> {
     }
     let column = |c: usize| DVec3::new(m[4 * c], m[4 * c + 1], m[4 * c + 2]);
     Ok(DAffine3 { matrix3: DMat3::from_cols(column(0), column(1), column(2)), translation: column(3) })
+}
+
+/// The map that a text says of the form `transform = ...`.
+///
+/// # Errors
+/// The first mistake, with its line and column.
+pub fn parse_transform(text: &str) -> Result<DAffine3> {
+    let source = Source { path: Path::new("transform"), text };
+    let table = DeTable::parse(text).map_err(|cause| source.error(0, cause.message()))?;
+    read_transform(&Fields::root(&source, table.get_ref()).require("transform")?)
 }

@@ -50,7 +50,11 @@ impl Text {
     }
 }
 
-fn model_scene(scene: &Scene, model: &Path, options: &LoadOptions, to: &Path) -> Result<String> {
+/// The text that [`save_model_scene`] writes.
+///
+/// # Errors
+/// Paths that are not UTF-8.
+pub fn model_scene(scene: &Scene, model: &Path, options: &LoadOptions, to: &Path) -> Result<String> {
     let mut out = Text::default();
     let name = model.file_name().unwrap_or_default().to_string_lossy();
     out.comment(&format!("The scene that whitted made for {}.", quoted(&name)));
@@ -94,6 +98,20 @@ fn model_scene(scene: &Scene, model: &Path, options: &LoadOptions, to: &Path) ->
         write_light(&mut out, light, &mut names);
     }
     Ok(out.0)
+}
+
+/// A camera's table, as a text of its own.
+pub fn camera_text(named: &NamedCamera) -> String {
+    let mut out = Text::default();
+    write_camera(&mut out, named, &mut Names::default());
+    out.0
+}
+
+/// A light's table, as a text of its own.
+pub fn light_text(light: &Light) -> String {
+    let mut out = Text::default();
+    write_light(&mut out, light, &mut Names::default());
+    out.0
 }
 
 fn write_film(out: &mut Text, film: &FilmSettings) {

@@ -69,7 +69,7 @@ impl Reference {
         let loose = match kind {
             ReferenceKind::Bvh2 => None,
             // Every instance is asked.
-            ReferenceKind::Loose => Some(TwoLevel::build(&scene, &params(Kind::Linear), progress)?),
+            ReferenceKind::Loose => Some(TwoLevel::build(&scene, None, &params(Kind::Linear), progress)?),
         };
         let linear = build(scene.clone(), Kind::Linear)?;
         Ok(Self { linear, loose, renderer: build(scene, Kind::Bvh2)?, checked_a_set: 1 })
