@@ -12,7 +12,6 @@ const LAYERS: &[&[&str]] = &[
     &["measure"],
     &["editor"],
     &["cli", "manual"],
-    &["editor"],
 ];
 
 fn layer(module: &str) -> Option<usize> {
