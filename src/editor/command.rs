@@ -6,7 +6,8 @@ use toml::Value;
 
 use crate::editor::document::Document;
 use crate::editor::item::{Item, Kind};
-use crate::editor::placement::{Place, Placement, number, read_vector, tidy_vector, vector};
+use crate::editor::numbers::tidy_vector;
+use crate::editor::placement::{Place, Placement, number, read_vector, vector};
 use crate::error::{Error, Result};
 use crate::math::transform::{apply, compose, point};
 

@@ -62,14 +62,9 @@ impl History {
         self.movement = None;
     }
 
-    /// The state before the last change.
+    /// The state before the last change, which undo restores.
     pub fn before(&self) -> Option<&State> {
         self.undo.back().map(|step| &step.state)
-    }
-
-    /// The state that undo restores.
-    pub fn peek_undo(&self) -> Option<&State> {
-        self.before()
     }
 
     /// The state that redo restores.

@@ -11,6 +11,7 @@ pub mod history;
 pub mod item;
 pub mod job;
 pub mod navigate;
+pub mod numbers;
 pub mod placement;
 pub mod presets;
 pub mod session;

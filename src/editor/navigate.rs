@@ -5,8 +5,7 @@ use glam::DVec3;
 use crate::math::transform::{apply, rotation_about};
 use crate::math::vector::{cross, dot, length, normalize};
 use crate::scene::auto::View;
-use crate::scene::extent::Extents;
-use crate::scene::{Camera, Projection, Scene};
+use crate::scene::{Camera, Projection};
 
 /// Nearer than this to straight up or down, in radians, the view does not tilt: `up` would no longer say where up is.
 const POLE: f64 = 0.01;
@@ -156,16 +155,6 @@ impl Looking {
         };
         self.eye = self.target + backward * distance;
     }
-}
-
-/// The box around some of a scene's objects, those without end left out; `None` if nothing is left.
-pub fn extent(scene: &Scene, objects: impl Iterator<Item = usize>) -> Option<(DVec3, DVec3)> {
-    let extents = Extents::of(scene);
-    let corners = objects.filter_map(|number| extents.corners(scene, scene.objects.get(number)?)).flatten();
-    corners.fold(None, |around: Option<(DVec3, DVec3)>, corner| {
-        let (min, max) = around.unwrap_or((corner, corner));
-        Some((min.min(corner), max.max(corner)))
-    })
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 use glam::{DAffine3, DMat3, DVec3};
 use toml::Value;
 
+use crate::editor::numbers::{tidy, tidy_vector};
 use crate::error::Result;
 use crate::formats::scene_file::parse_transform;
 use crate::math::transform::rotation_xyz;
@@ -184,18 +185,6 @@ pub fn read_vector(value: &Value) -> Option<DVec3> {
     }
 }
 
-/// The number with few digits that rounding has moved by some ulps; else itself.
-pub fn tidy(x: f64) -> f64 {
-    let near = format!("{x:.12e}").parse().unwrap_or(x);
-    // -0 is of no use to people.
-    if f64::abs(near - x) <= 16.0 * f64::EPSILON * x.abs().max(1.0) { near + 0.0 } else { x }
-}
-
-/// [`tidy`] for each number.
-pub fn tidy_vector(v: DVec3) -> DVec3 {
-    DVec3::from_array(v.to_array().map(tidy))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -251,13 +240,5 @@ mod tests {
         assert_eq!(sheared.affine(), parse_transform(text).unwrap());
         assert_eq!(Place::read(sheared.write().as_ref()).unwrap(), sheared);
         assert!(Place::read(Some(&Value::Boolean(true))).is_err());
-    }
-
-    #[test]
-    fn rounding_noise_goes_and_digits_stay() {
-        assert_eq!(tidy(0.1 + 0.2), 0.3);
-        assert_eq!(tidy(29.999_999_999_999_996), 30.0);
-        assert_eq!(tidy(1.0 / 3.0), 1.0 / 3.0);
-        assert_eq!(tidy(1e-17).to_bits(), 1e-17f64.to_bits());
     }
 }

@@ -6,7 +6,8 @@ use toml::Value;
 use crate::editor::Command;
 use crate::editor::document::Document;
 use crate::editor::item::Kind;
-use crate::editor::placement::{tidy_vector, vector};
+use crate::editor::numbers::tidy_vector;
+use crate::editor::placement::vector;
 use crate::editor::window::actions::{NewLight, NewObject};
 
 /// A material by name, with the fields that make it.
@@ -63,19 +64,6 @@ fn lines(text: &str) -> Vec<(String, Value)> {
         table.into_iter().next()
     };
     text.lines().filter_map(field).collect()
-}
-
-/// A length of one digit, 1, 2 or 5, near to another.
-pub fn round_size(size: f64) -> f64 {
-    if !(size.is_finite() && size > 0.0) {
-        return 1.0;
-    }
-    let power = libm::pow(10.0, libm::floor(libm::log10(size)));
-    let digit = [1.0, 2.0, 5.0, 10.0].into_iter().min_by(|a, b| {
-        let off = |digit: f64| libm::log(size / (digit * power)).abs();
-        off(*a).total_cmp(&off(*b))
-    });
-    digit.unwrap_or(1.0) * power
 }
 
 /// What adds an object of some size at a place.

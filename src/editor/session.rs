@@ -1,9 +1,11 @@
 //! A scene that is being edited, without a window: its text, what the text says, what is selected, and what was done.
 
 use std::collections::BTreeSet;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use glam::DVec3;
 use toml::Value;
 
 use crate::editor::command::{Command, same};
@@ -15,6 +17,7 @@ use crate::formats::atomic_file::write_atomically;
 use crate::formats::scene_file::{Assets, Parsed, camera_text, light_text, model_scene, parse_with};
 use crate::formats::{self, LoadOptions};
 use crate::progress::{Progress, Silent};
+use crate::scene::extent::Extents;
 use crate::scene::{Camera, NamedCamera, Scene, origin};
 
 /// What a new scene is.
@@ -30,8 +33,8 @@ pub struct Reading {
     pub first_material: usize,
     /// Whether the lights are those of models.
     pub imports_lights: bool,
-    /// What was noted of the scene's files.
-    pub ledger: crate::formats::Ledger,
+    /// The boxes of the scene's meshes.
+    pub extents: Extents,
 }
 
 /// A scene that is being edited.
@@ -202,9 +205,29 @@ impl Session {
     }
 
     /// The numbers in the scene of the objects that an `[[object]]` makes.
-    pub fn instances(&self, object: usize) -> impl Iterator<Item = usize> + '_ {
-        let entries = self.reading.entries.iter().enumerate();
-        entries.filter(move |(_, entry)| **entry as usize == object).map(|(number, _)| number)
+    pub fn instances(&self, object: usize) -> Range<usize> {
+        // In the file's order, so that those of one stand together.
+        let entries = &self.reading.entries;
+        let first = entries.partition_point(|&entry| (entry as usize) < object);
+        first..entries.partition_point(|&entry| entry as usize <= object)
+    }
+
+    /// The box around what some `[[object]]`s make, that without end left out, in the file's coordinates; `None` if nothing is left.
+    pub fn extent(&self, objects: impl Iterator<Item = usize>) -> Option<(DVec3, DVec3)> {
+        let Reading { scene, extents, .. } = &self.reading;
+        let instances = objects.flat_map(|object| self.instances(object));
+        let corners = instances.filter_map(|number| extents.corners(scene, &scene.objects[number])).flatten();
+        corners.fold(None, |around: Option<(DVec3, DVec3)>, corner| {
+            let (min, max) = around.unwrap_or((corner, corner));
+            Some((min.min(corner), max.max(corner)))
+        })
+    }
+
+    /// The materials of its file that an object has, as positions in the scene's list, ascending. Looks at all of its triangles.
+    pub fn imported_materials(&self, object: usize) -> Vec<usize> {
+        let scene = &self.reading.scene;
+        let used = scene.materials_used_by(self.instances(object).map(|number| &scene.objects[number]));
+        used.iter().enumerate().filter(|(_, used)| **used).map(|(number, _)| number).collect()
     }
 
     /// Changes the scene. What the scene file may not say is refused, and nothing is changed.
@@ -287,7 +310,7 @@ impl Session {
     /// # Errors
     /// Those of reading the scene as it was, whose files may have changed.
     pub fn undo(&mut self) -> Result<bool> {
-        let Some(state) = self.history.peek_undo() else { return Ok(false) };
+        let Some(state) = self.history.before() else { return Ok(false) };
         self.restore(&state.clone())?;
         Ok(true)
     }
@@ -458,11 +481,6 @@ impl Session {
     pub fn relative(&self, path: &Path) -> String {
         formats::atomic_file::relative_to(path, &self.place).to_string_lossy().replace('\\', "/")
     }
-
-    /// The path that the scene file names.
-    pub fn resolve(&self, name: &str) -> PathBuf {
-        self.place.parent().unwrap_or(Path::new("")).join(name)
-    }
 }
 
 fn removes(command: &Command) -> bool {
@@ -481,18 +499,12 @@ fn read(
     assets: &mut Assets,
     progress: &dyn Progress,
 ) -> Result<Reading> {
-    let Parsed { loaded, entries, imported_materials, imports_lights } =
+    let Parsed { loaded, entries, imported_materials, imports_lights, extents } =
         parse_with(text, place, options, assets, progress)?;
     let mut scene = loaded.scene;
-    scene.origin = origin::choose(&scene);
+    scene.origin = origin::choose_within(&scene, &extents);
     scene.active_camera = if camera < scene.cameras.len() { camera } else { 0 };
-    Ok(Reading {
-        scene: Arc::new(scene),
-        entries,
-        first_material: imported_materials,
-        imports_lights,
-        ledger: loaded.ledger,
-    })
+    Ok(Reading { scene: Arc::new(scene), entries, first_material: imported_materials, imports_lights, extents })
 }
 
 /// The fields of a text that is one table.

@@ -275,22 +275,68 @@ fn objects_move_in_the_scene_whatever_their_transform_is() {
 
 #[test]
 fn lights_and_cameras_of_models_are_written_before_the_first_of_the_scenes_own() {
-    let mut session = open(Path::new("meshes/metal_roughness.glb"));
-    assert!(session.is_changed() && session.path().is_none());
+    let folder = tempfile::tempdir().unwrap();
+    let data = "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA";
+    let model = serde_json::json!({
+        "asset": {"version": "2.0"},
+        "extensionsUsed": ["KHR_lights_punctual"],
+        "extensions": {"KHR_lights_punctual": {"lights": [
+            {"type": "point", "name": "lamp", "intensity": 3, "color": [1, 0.5, 0.25]},
+            {"type": "spot", "intensity": 2, "spot": {"innerConeAngle": 0.1, "outerConeAngle": 0.3}}
+        ]}},
+        "scenes": [{"nodes": [0, 1, 2, 3, 4]}],
+        "nodes": [
+            {"mesh": 0},
+            {"translation": [1, 2, 3], "extensions": {"KHR_lights_punctual": {"light": 0}}},
+            {"translation": [0, 2, 0], "extensions": {"KHR_lights_punctual": {"light": 1}}},
+            {"camera": 0, "translation": [0, 0, 4], "name": "front"},
+            {"camera": 0, "translation": [0, 0, 9]}
+        ],
+        "cameras": [{"type": "perspective", "perspective": {"yfov": 0.7, "znear": 0.1}}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "buffers": [{"byteLength": 36, "uri": data}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]}],
+    });
+    std::fs::write(folder.path().join("m.gltf"), model.to_string()).unwrap();
+    let text = "[[object]]\nmesh = \"m.gltf\"\n";
+    let open = || Session::of_text(text, None, folder.path().join("s.toml"), LoadOptions::default(), &Silent).unwrap();
+    let mut session = open();
     let lights = session.scene().lights.clone();
-    assert!(!lights.is_empty());
+    assert_eq!(lights.len(), 2);
     let fields =
         vec![("kind".into(), Value::from("point")), ("position".into(), "[1, 2, 3]".parse::<Value>().unwrap())];
     session.apply(&session.adding_light(fields.clone()).unwrap()).unwrap();
-    assert_eq!(session.scene().lights.len(), lights.len() + 1);
-    assert_eq!(session.scene().lights[0].kind, lights[0].kind);
+    let shines = |light: &crate::scene::Light| (light.kind, light.color);
+    let after: Vec<_> = session.scene().lights.iter().map(shines).collect();
+    assert_eq!(after[..2], lights.iter().map(shines).collect::<Vec<_>>(), "those of the model still shine");
+    session.apply(&session.adding_light(fields).unwrap()).unwrap();
+    assert_eq!((after.len(), session.scene().lights.len()), (3, 4), "once");
 
-    let text = "[[object]]\nmesh = \"meshes/metal_roughness.glb\"\n";
-    let mut bare = Session::of_text(text, None, PathBuf::from("s.toml"), LoadOptions::default(), &Silent).unwrap();
-    let camera = *bare.scene().camera();
-    bare.set_camera(camera, None).unwrap();
-    assert_eq!(*bare.scene().camera(), camera);
-    assert_eq!(bare.document().count(Kind::Camera), bare.scene().cameras.len());
+    let mut session = open();
+    let cameras: Vec<Camera> = session.scene().cameras.iter().map(|named| named.camera).collect();
+    assert_eq!(cameras.len(), 2);
+    session.set_camera(cameras[1], None).unwrap();
+    let after: Vec<Camera> = session.scene().cameras.iter().map(|named| named.camera).collect();
+    assert_eq!(after, [cameras[1], cameras[1]], "the first is moved, the other stays");
+}
+
+#[test]
+fn a_model_becomes_a_scene_that_is_in_no_file_yet() {
+    let session = open(Path::new("meshes/metal_roughness.glb"));
+    assert!(session.is_changed() && session.path().is_none());
+    assert_eq!(session.suggested_path(), Path::new("meshes/metal_roughness.toml"));
+}
+
+#[test]
+fn an_objects_materials_of_its_file_are_those_that_its_triangles_have() {
+    let session = session(
+        "[[material]]\nname = \"own\"\n[[object]]\nmesh = \"meshes/cornell_box.obj\"\n[[object]]\nsphere = {}\nmaterial = \"own\"\n",
+    );
+    let names: Vec<_> =
+        session.imported_materials(0).iter().map(|&number| session.scene().materials[number].name.clone()).collect();
+    assert_eq!(names, ["white", "red", "green", "lamp"], "as its usemtl lines say, without the neutral one");
+    assert_eq!(session.instances(1), 1..2);
 }
 
 #[test]

@@ -114,8 +114,13 @@ impl Scene {
 
     /// Which materials some object or triangle refers to, by position.
     pub fn used_materials(&self) -> Vec<bool> {
+        self.materials_used_by(self.objects.iter())
+    }
+
+    /// Which materials these of the scene's objects, or their triangles, refer to, by position.
+    pub fn materials_used_by<'a>(&self, objects: impl Iterator<Item = &'a Object>) -> Vec<bool> {
         let mut used = vec![false; self.materials.len()];
-        for object in &self.objects {
+        for object in objects {
             match (object.material, object.shape) {
                 (Some(material), _) => used[material as usize] = true,
                 (None, Shape::Mesh(mesh)) => {

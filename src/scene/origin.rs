@@ -13,17 +13,28 @@ use crate::scene::{Scene, Shape};
 /// with most triangles is taken: it then needs no translation. Otherwise zero, unless the scene lies [`FAR`] from it:
 /// then a point on a power-of-two grid amid it.
 pub fn choose(scene: &Scene) -> DVec3 {
+    of_largest(scene).unwrap_or_else(|| of_all(scene, &Extents::of(scene)))
+}
+
+/// [`choose`] where the boxes of the scene's meshes are known.
+pub fn choose_within(scene: &Scene, extents: &Extents) -> DVec3 {
+    of_largest(scene).unwrap_or_else(|| of_all(scene, extents))
+}
+
+/// That of the mesh with most triangles, where one is not moved.
+fn of_largest(scene: &Scene) -> Option<DVec3> {
     let unmoved = scene.objects.iter().filter_map(|object| match object.shape {
         Shape::Mesh(mesh) if swaps_axes(&object.transform) => Some((&scene.meshes[mesh as usize], object)),
         _ => None,
     });
     // `max_by_key` keeps the last of equals; reversed, that is the first in the file.
     let largest = unmoved.rev().max_by_key(|(mesh, _)| mesh.live_count());
-    if let Some((mesh, object)) = largest {
-        // Exact: ones and zeros. Adding 0 takes the sign off a zero.
-        return point(&object.transform, mesh.origin) + DVec3::ZERO;
-    }
-    let extents = Extents::of(scene);
+    // Exact: ones and zeros. Adding 0 takes the sign off a zero.
+    largest.map(|(mesh, object)| point(&object.transform, mesh.origin) + DVec3::ZERO)
+}
+
+/// One amid all objects, where zero is far away.
+fn of_all(scene: &Scene, extents: &Extents) -> DVec3 {
     let corners: Vec<DVec3> =
         scene.objects.iter().filter_map(|object| extents.corners(scene, object)).flatten().collect();
     let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);

@@ -11,7 +11,7 @@ use crate::scene::{Camera, Projection};
 const NEAREST_SHARE: f64 = 2e-5;
 
 /// The same as a share of the distance to what the camera looks at, where that is more: there the buffer then tells apart what
-/// differs by a 100000th of its distance.
+/// differs by an 80000th of its distance.
 const NEAREST_TO_FOCUS: f64 = 5e-3;
 
 /// A camera and the size of its picture in pixels, in the file's coordinates.

@@ -3,6 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 
+use crate::editor::numbers::round_size;
 use crate::editor::viewport::tessellate::Extent;
 
 /// One of a line's four vertices, as the shader takes them.
@@ -46,7 +47,8 @@ impl Lines {
     /// The grid on the plane y = 0 under a scene, and the axes: x red, y green, z blue.
     pub fn add_grid(&mut self, extent: &Extent, origin: DVec3) {
         let size = (extent.max - extent.min).max_element();
-        let step = step_for(size);
+        // About ten steps are the scene.
+        let step = round_size(size / 10.0);
         let middle = (extent.min + extent.max) * 0.5;
         let snapped = |x: f64| (x / (10.0 * step)).round() * 10.0 * step;
         let (x, z) = (snapped(middle.x), snapped(middle.z));
@@ -80,33 +82,9 @@ impl Lines {
     }
 }
 
-/// The grid's step for a scene of this size: 1, 2 or 5 times a power of ten, of which the size has about ten.
-fn step_for(size: f64) -> f64 {
-    let about = if size > 0.0 && size < f64::INFINITY { size / 10.0 } else { 1.0 };
-    let power = libm::pow(10.0, libm::log10(about).floor());
-    let share = about / power;
-    power
-        * if share < 1.5 {
-            1.0
-        } else if share < 3.5 {
-            2.0
-        } else if share < 7.5 {
-            5.0
-        } else {
-            10.0
-        }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn steps_are_round() {
-        for (size, step) in [(10.0, 1.0), (25.0, 2.0), (70.0, 5.0), (0.1, 0.01), (90.0, 10.0), (0.0, 1.0)] {
-            assert!((step_for(size) / step - 1.0).abs() < 1e-12, "{size}: {}", step_for(size));
-        }
-    }
 
     #[test]
     fn a_box_has_twelve_edges() {

@@ -142,10 +142,8 @@ impl Viewport {
         let Self { gl, painter, prepared, target, .. } = self;
         let (Some(prepared), Some(target)) = (prepared, target) else { return Ok(Stats::default()) };
         let drawing = &prepared.drawing;
-        let near = drawing.extent.unwrap_or(Extent { min: DVec3::splat(-5.0), max: DVec3::splat(5.0) });
-        let corners =
-            || (0..8).map(|i| DVec3::from_array(std::array::from_fn(|k| [near.min, near.max][i >> k & 1][k])));
-        let view = view.around(drawing.corners().chain(corners()));
+        let near = drawing.extent.unwrap_or(Extent::ORDINARY);
+        let view = view.around(drawing.corners().chain(near.corners()));
         let frame = Frame {
             scene,
             drawing,

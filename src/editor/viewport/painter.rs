@@ -269,7 +269,10 @@ impl Painter {
         let Some(uploaded) = self.pieces.get(&key(batch)) else { return Ok(0) };
         let count = batch.parts.iter().map(|part| u64::from(part.end - part.start) / 3).sum();
         match &uploaded.edges {
-            Some(edges) if frame.wireframe => gl.draw(edges, Shape::Lines, std::slice::from_ref(&(0..u32::MAX))),
+            Some(edges) if frame.wireframe => {
+                let parts: Vec<_> = batch.parts.iter().map(|part| 2 * part.start..2 * part.end).collect();
+                gl.draw(edges, Shape::Lines, &parts);
+            }
             _ if gl.is_software && count >= SIEVED => {
                 let rows = clip_rows(frame.view, transform);
                 let indices = sift(batch.piece, &batch.parts, rows, frame.view.size(), batch.sides);
@@ -547,15 +550,7 @@ fn geometry(gl: &Gl, piece: &Piece, indices: &[u32]) -> Result<Geometry> {
     gl.geometry(&attributes, indices)
 }
 
-/// The edges of a piece's triangles, each once for each cluster.
+/// The edges of a piece's triangles, in their order: a part of the indices has its edges in twice the part.
 fn edges(piece: &Piece) -> Vec<u32> {
-    let mut edges: Vec<[u32; 2]> = piece
-        .indices
-        .chunks_exact(3)
-        .flat_map(|corners| (0..3).map(|k| [corners[k], corners[(k + 1) % 3]]))
-        .map(|[a, b]| [a.min(b), a.max(b)])
-        .collect();
-    edges.sort_unstable();
-    edges.dedup();
-    edges.concat()
+    piece.indices.chunks_exact(3).flat_map(|corners| (0..3).flat_map(|k| [corners[k], corners[(k + 1) % 3]])).collect()
 }

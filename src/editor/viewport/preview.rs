@@ -132,7 +132,7 @@ impl Preview {
                 drawing.include(bounds.corners().map(|corner| point(&object.transform, corner.as_dvec3())));
             }
         }
-        let extent = drawing.extent.unwrap_or(Extent { min: DVec3::splat(-5.0), max: DVec3::splat(5.0) });
+        let extent = drawing.extent.unwrap_or(Extent::ORDINARY);
         // As many triangles as a few fine ones have, whatever their number.
         let share = (FEW_QUADRICS as f64 / count.max(1) as f64).sqrt().min(1.0);
         let cells = ((f64::from(CELLS.0) * share) as u32).max(CELLS.1);
@@ -162,13 +162,10 @@ fn fineness(quadric: &Quadric, object: &Object, extent: &Extent, cells: u32) -> 
         return Some(Fineness { cells, near: none, far: none });
     }
     let local = |extent: &Extent| {
-        let corner = |i: usize| {
-            let pick = |axis: usize| if i >> axis & 1 == 1 { extent.max[axis] } else { extent.min[axis] };
-            transform.point_to_object(DVec3::new(pick(0), pick(1), pick(2)))
-        };
-        (0..8).map(corner).fold(Extent { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY }, |Extent { min, max }, p| {
-            Extent { min: min.min(p), max: max.max(p) }
-        })
+        extent.corners().map(|corner| transform.point_to_object(corner)).into_iter().fold(
+            Extent { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY },
+            |Extent { min, max }, p| Extent { min: min.min(p), max: max.max(p) },
+        )
     };
     let (center, half) = ((extent.min + extent.max) * 0.5, (extent.max - extent.min) * 0.5);
     // A cube, so that flat scenes are seen from above their plane too.
@@ -220,10 +217,8 @@ impl Placed {
     /// The corners of its box in the file's coordinates; bit k of a corner's number says which side of axis k it is on.
     pub fn corners(&self) -> [DVec3; 8] {
         let (min, max) = self.shown.piece.bounds;
-        std::array::from_fn(|i| {
-            let pick = |axis: usize| if i >> axis & 1 == 1 { max[axis] } else { min[axis] };
-            self.transform.point_to_world(Vec3::new(pick(0), pick(1), pick(2)).as_dvec3())
-        })
+        let corners = Extent { min: min.as_dvec3(), max: max.as_dvec3() }.corners();
+        corners.map(|corner| self.transform.point_to_world(corner))
     }
 }
 
@@ -239,10 +234,10 @@ impl Shown {
     ///
     /// Of a drawing of so many triangles, all stand-ins together have about `most`. It is made once, in the background.
     pub fn stand_in(self: &Arc<Self>, total: usize, most: usize) -> Option<&Piece> {
-        let count = self.piece.triangle_count();
-        if count < SMALL / 10 || total <= most {
+        if !self.wants_stand_in(total, most) {
             return None;
         }
+        let count = self.piece.triangle_count();
         if let Some(made) = self.stand_in.get() {
             return made.as_ref();
         }
@@ -256,12 +251,15 @@ impl Shown {
         });
         None
     }
-}
 
-impl Shown {
+    /// Whether there is to be one: for what is not small, of a drawing that has too many triangles.
+    fn wants_stand_in(&self, total: usize, most: usize) -> bool {
+        self.piece.triangle_count() >= SMALL / 10 && total > most
+    }
+
     /// Whether [`stand_in`](Self::stand_in) gives all that it will ever give.
     pub fn has_stand_in(&self, total: usize, most: usize) -> bool {
-        self.piece.triangle_count() < SMALL / 10 || total <= most || self.stand_in.get().is_some()
+        !self.wants_stand_in(total, most) || self.stand_in.get().is_some()
     }
 }
 

@@ -8,7 +8,7 @@ use glam::{DVec2, DVec3};
 use super::Editor;
 use super::actions::Action;
 use crate::editor::gizmo::{Gizmo, Handle, Tool};
-use crate::editor::navigate::{Looking, extent};
+use crate::editor::navigate::Looking;
 use crate::editor::viewport::camera::View;
 use crate::editor::{Command, Item, Kind};
 use crate::geometry::Ray;
@@ -166,7 +166,7 @@ fn gizmo(editor: &Editor, view: View, scale: f32) -> Option<Gizmo> {
     let mut places = Vec::new();
     for item in session.selection() {
         match item.kind {
-            Kind::Object => match extent(scene, session.instances(item.index)) {
+            Kind::Object => match session.extent(std::iter::once(item.index)) {
                 Some((min, max)) => places.push(min + (max - min) * 0.5),
                 None => places
                     .extend(session.instances(item.index).map(|number| scene.objects[number].transform.translation)),

@@ -93,12 +93,14 @@ pub struct PathDialog {
     text: String,
     found: Option<Receiver<Option<PathBuf>>>,
     is_new: bool,
+    /// The files of the folder that was looked into last.
+    listing: Option<(PathBuf, Vec<(bool, String)>)>,
 }
 
 impl PathDialog {
     /// Asks for a path, beginning at one.
     pub fn new(purpose: Purpose, start: &Path) -> Self {
-        Self { purpose, text: start.display().to_string(), found: None, is_new: true }
+        Self { purpose, text: start.display().to_string(), found: None, is_new: true, listing: None }
     }
 
     fn show(&mut self, ctx: &Context) -> Option<Answer> {
@@ -144,37 +146,44 @@ impl PathDialog {
 
     /// Files of the folder that is typed that begin as the name does.
     fn files(&mut self, ui: &mut egui::Ui) {
-        /// More are not looked at.
-        const MOST: usize = 4096;
         let typed = PathBuf::from(&self.text);
         let is_folder = self.text.is_empty() || self.text.ends_with(std::path::is_separator);
         let folder = if is_folder { typed.clone() } else { typed.parent().map(Path::to_path_buf).unwrap_or_default() };
         let begin = if is_folder { String::new() } else { file_name(&typed) };
-        let place = if folder.as_os_str().is_empty() { Path::new(".") } else { &folder };
-        let Ok(entries) = std::fs::read_dir(place) else { return };
-        let mut names: Vec<(bool, String)> = entries
-            .take(MOST)
-            .flatten()
-            .map(|entry| (entry.path().is_dir(), entry.file_name().to_string_lossy().into_owned()))
-            .filter(|(is_dir, name)| {
-                let suffix = Path::new(name).extension().map(|s| s.to_string_lossy().to_ascii_lowercase());
-                let fits = suffix.is_some_and(|suffix| self.purpose.suffixes().contains(&suffix.as_str()));
-                !name.starts_with('.') && (*is_dir || fits)
-            })
-            .collect();
-        names.sort_by(|a, b| (!a.0, &a.1).cmp(&(!b.0, &b.1)));
-        if names.iter().any(|(_, name)| name.starts_with(&begin)) {
-            names.retain(|(_, name)| name.starts_with(&begin));
+        if self.listing.as_ref().is_none_or(|(known, _)| *known != folder) {
+            self.listing = Some((folder.clone(), files_of(&folder, self.purpose.suffixes())));
         }
+        let Some((_, files)) = &self.listing else { return };
+        let begins = |(_, name): &&(bool, String)| name.starts_with(&begin);
+        let shown: Vec<&(bool, String)> = match files.iter().any(|file| begins(&file)) {
+            true => files.iter().filter(begins).collect(),
+            false => files.iter().collect(),
+        };
         egui::ScrollArea::vertical().max_height(220.0).auto_shrink([false, true]).show(ui, |ui| {
-            for (is_dir, name) in names {
-                let label = if is_dir { format!("{name}/") } else { name.clone() };
+            for (is_dir, name) in shown {
+                let label = if *is_dir { format!("{name}/") } else { name.clone() };
                 if ui.selectable_label(false, &label).clicked() {
                     self.text = folder.join(&label).display().to_string();
                 }
             }
         });
     }
+}
+
+/// Folders, and files of these suffixes, in a folder: whether each is a folder, and its name.
+fn files_of(folder: &Path, suffixes: &[&str]) -> Vec<(bool, String)> {
+    /// More are not looked at.
+    const MOST: usize = 4096;
+    let place = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let entries = std::fs::read_dir(place).into_iter().flatten().take(MOST).flatten();
+    let files = entries.map(|entry| (entry.path().is_dir(), entry.file_name().to_string_lossy().into_owned()));
+    let fits = |name: &str| {
+        let suffix = Path::new(name).extension().map(|suffix| suffix.to_string_lossy().to_ascii_lowercase());
+        suffix.is_some_and(|suffix| suffixes.contains(&suffix.as_str()))
+    };
+    let mut files: Vec<_> = files.filter(|(is_dir, name)| !name.starts_with('.') && (*is_dir || fits(name))).collect();
+    files.sort_by(|a, b| (!a.0, &a.1).cmp(&(!b.0, &b.1)));
+    files
 }
 
 fn file_name(path: &Path) -> String {

@@ -76,7 +76,7 @@ pub struct Editor {
     movements: u64,
     pick: Option<(DVec2, bool)>,
     tree: Option<tree::Tree>,
-    ball: ball::Ball,
+    memory: properties::Memory,
     dialog: Option<Dialog>,
     loading: Option<Loading>,
     message: Option<(String, bool)>,
@@ -87,8 +87,10 @@ pub struct Editor {
     seen_revision: u64,
     kept_revision: u64,
     may_close: bool,
-    frame_times: Vec<f32>,
+    times: FrameTimes,
     title: String,
+    /// Kept as long as the window is open.
+    claim: Option<settings::Claim>,
 }
 
 impl Editor {
@@ -115,7 +117,7 @@ impl Editor {
             movements: canvas::NAVIGATION,
             pick: None,
             tree: None,
-            ball: ball::Ball::default(),
+            memory: properties::Memory::default(),
             dialog: None,
             loading: None,
             message: None,
@@ -126,8 +128,9 @@ impl Editor {
             seen_revision: revision,
             kept_revision: revision,
             may_close: false,
-            frame_times: Vec::new(),
+            times: FrameTimes::default(),
             title: String::new(),
+            claim: None,
         })
     }
 
@@ -403,8 +406,7 @@ impl Editor {
         egui::Panel::bottom("status").show(ui, |ui| menus::status(ui, self, &mut edits));
         egui::Panel::left("list").default_size(190.0).show(ui, |ui| outliner::show(ui, &self.session, &mut edits));
         egui::Panel::right("fields").default_size(310.0).show(ui, |ui| {
-            let ball = &mut self.ball;
-            properties::show(ui, &self.session, &mut edits, |ui, material| ball.show(ui, material));
+            properties::show(ui, &self.session, &mut edits, &mut self.memory);
         });
         egui::CentralPanel::no_frame().show(ui, |ui| canvas::show(ui, self));
         menus::windows(&ctx, self);
@@ -495,6 +497,30 @@ impl Editor {
     }
 }
 
+/// How long frames took, where the variable `WHITTED_EDITOR_TIMES` asks for it: as long as one takes, input waits.
+#[derive(Default)]
+struct FrameTimes {
+    seconds: Vec<f32>,
+}
+
+impl FrameTimes {
+    /// Notes what the frame before took.
+    fn note(&mut self, seconds: Option<f32>) {
+        if std::env::var_os("WHITTED_EDITOR_TIMES").is_some() {
+            self.seconds.extend(seconds);
+        }
+    }
+
+    /// Tells it on standard error.
+    fn tell(&mut self) {
+        self.seconds.sort_unstable_by(f32::total_cmp);
+        if let [.., longest] = self.seconds.as_slice() {
+            let (count, median) = (self.seconds.len(), self.seconds[self.seconds.len() / 2]);
+            eprintln!("{count} frames, half of them within {:.1} ms, all within {:.1} ms", median * 1e3, longest * 1e3);
+        }
+    }
+}
+
 impl eframe::App for Editor {
     fn ui(&mut self, ui: &mut Ui, frame: &mut eframe::Frame) {
         self.show(ui);
@@ -505,18 +531,11 @@ impl eframe::App for Editor {
             ui.ctx().send_viewport_cmd(egui::ViewportCommand::Title(title.clone()));
             self.title = title;
         }
-        if std::env::var_os("WHITTED_EDITOR_TIMES").is_some() {
-            self.frame_times.push(frame.info().cpu_usage.unwrap_or(0.0));
-        }
+        self.times.note(frame.info().cpu_usage);
     }
 
     fn on_exit(&mut self, _gl: Option<&glow::Context>) {
-        if !self.frame_times.is_empty() {
-            let longest = self.frame_times.iter().copied().fold(0.0, f32::max);
-            let mean = self.frame_times.iter().sum::<f32>() / self.frame_times.len() as f32;
-            let count = self.frame_times.len();
-            eprintln!("{count} frames, {:.1} ms in the mean, {:.1} ms at most", mean * 1e3, longest * 1e3);
-        }
+        self.times.tell();
         if let Some(viewport) = self.viewport.take().and_then(Arc::into_inner) {
             viewport.into_inner().unwrap_or_else(PoisonError::into_inner).destroy();
         }
@@ -528,11 +547,14 @@ impl eframe::App for Editor {
 /// # Errors
 /// Those of reading the input; a system's error where there is no window system or no OpenGL.
 pub fn run(input: Option<&Path>, options: &LoadOptions) -> Result<()> {
-    let settings = Settings::load();
+    let mut settings = Settings::load();
     let session = match input {
         Some(path) => Session::open(path, options, &crate::progress::Silent)?,
         None => Session::new(Path::new(""))?,
     };
+    if let Some(path) = session.path() {
+        settings.note(path);
+    }
     let viewport = egui::ViewportBuilder::default()
         .with_title(perform::window_title(&session, None))
         .with_app_id("whitted")
@@ -542,13 +564,10 @@ pub fn run(input: Option<&Path>, options: &LoadOptions) -> Result<()> {
     let create = move |context: &eframe::CreationContext<'_>| {
         let ctx = context.egui_ctx.clone();
         let wake = ctx.clone();
-        if let Some(path) = session.path() {
-            let mut noted = settings.clone();
-            noted.note(path);
-        }
-        let mut editor = Editor::new(session, Settings::load(), move || wake.request_repaint())?;
+        let mut editor = Editor::new(session, settings, move || wake.request_repaint())?;
         editor.attach(context.gl.as_ref());
         editor.use_theme(&ctx);
+        editor.claim = editor.settings.claim();
         if let Some(unsaved) = editor.settings.take_left_over() {
             editor.dialog = Some(Dialog::Recover(unsaved));
         }

@@ -9,8 +9,8 @@ use super::actions::{Action, ENTRIES, NewObject};
 use super::canvas;
 use super::dialogs::{After, Dialog, PathDialog, Purpose};
 use super::{Editor, properties};
-use crate::editor::navigate::{Looking, extent};
-use crate::editor::{Command, Item, Kind, Session, presets};
+use crate::editor::navigate::Looking;
+use crate::editor::{Command, Item, Kind, Session, numbers, presets};
 use crate::formats::picture;
 use crate::scene::Shape;
 
@@ -78,7 +78,7 @@ impl Editor {
             Action::AddObject(object) => self.add_object(object),
             Action::AddLight(light) => {
                 let looking = Looking::of(self.session.scene().camera());
-                let distance = presets::round_size(0.7 * looking.height());
+                let distance = numbers::round_size(0.7 * looking.height());
                 let fields = presets::light(self.session.document(), light, self.middle(), distance);
                 match self.session.adding_light(fields) {
                     Ok(command) => self.apply(&command),
@@ -91,15 +91,12 @@ impl Editor {
             }
             Action::Tool(tool) => self.tool = tool,
             Action::FrameSelected => {
-                let session = &self.session;
-                let selected = session.selection().iter().filter(|item| item.kind == Kind::Object);
-                let around = extent(session.scene(), selected.flat_map(|item| session.instances(item.index)));
-                self.frame(around);
+                let selected = self.session.selection().iter().filter(|item| item.kind == Kind::Object);
+                self.frame(self.session.extent(selected.map(|item| item.index)));
             }
             Action::FrameAll => {
-                let scene = self.session.scene();
-                let around = extent(scene, 0..scene.objects.len());
-                self.frame(around);
+                let count = self.session.document().count(Kind::Object);
+                self.frame(self.session.extent(0..count));
             }
             Action::Look(view) => {
                 let mut looking = Looking::of(self.session.scene().camera());
@@ -145,14 +142,14 @@ impl Editor {
     /// What the view looks at, to the digits that its size gives sense to.
     fn middle(&self) -> glam::DVec3 {
         let looking = Looking::of(self.session.scene().camera());
-        let step = presets::round_size(looking.height()) * 0.05;
+        let step = numbers::round_size(looking.height()) * 0.05;
         let parts = 1.0 / step;
         glam::DVec3::from_array(looking.target.to_array().map(|x| (x * parts).round() / parts))
     }
 
     fn add_object(&mut self, object: NewObject) {
         let looking = Looking::of(self.session.scene().camera());
-        let size = presets::round_size(0.15 * looking.height());
+        let size = numbers::round_size(0.15 * looking.height());
         let command = presets::add_object(self.session.document(), object, self.middle(), size);
         self.apply(&command);
     }

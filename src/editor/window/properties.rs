@@ -4,17 +4,38 @@ use eframe::egui::{self, Ui};
 use glam::DVec3;
 use toml::Value;
 
+use super::ball::Ball;
 use super::edits::{Ask, Edits, short};
 use super::widgets::{Number, choice, colored, flag, grid, point, row, three, weighted, whole};
 use super::{outliner, shapes};
 use crate::editor::command::place_of;
-use crate::editor::placement::{Place, Placement};
+use crate::editor::navigate::Looking;
+use crate::editor::numbers::tidy;
+use crate::editor::placement::{Place, Placement, number};
 use crate::editor::presets::PRESETS;
 use crate::editor::{Command, Item, Kind, Session};
 use crate::scene::{Clamp, Falloff, LightKind, Material, Projection, Shape, Transfer};
 
+/// What the panel has found out of what it shows.
+#[derive(Default)]
+pub struct Memory {
+    ball: Ball,
+    /// The materials of its file that an object has, and of which revision of the scene.
+    imported: Option<(u64, usize, Vec<usize>)>,
+}
+
+impl Memory {
+    fn imported(&mut self, session: &Session, object: usize) -> &[usize] {
+        let revision = session.revision();
+        if self.imported.as_ref().is_none_or(|(known, of, _)| (*known, *of) != (revision, object)) {
+            self.imported = Some((revision, object, session.imported_materials(object)));
+        }
+        self.imported.as_ref().map_or(&[], |(.., materials)| materials)
+    }
+}
+
 /// Shows the selected items' fields, those of the film, the background and the camera.
-pub fn show(ui: &mut Ui, session: &Session, edits: &mut Edits, ball: impl FnOnce(&mut Ui, &Material)) {
+pub fn show(ui: &mut Ui, session: &Session, edits: &mut Edits, memory: &mut Memory) {
     egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
         let selected: Vec<Item> = session.selection().iter().copied().collect();
         match selected.as_slice() {
@@ -22,14 +43,14 @@ pub fn show(ui: &mut Ui, session: &Session, edits: &mut Edits, ball: impl FnOnce
                 ui.weak("Nothing is selected.");
             }
             [one] => match one.kind {
-                Kind::Object => object(ui, session, *one, edits, ball),
+                Kind::Object => object(ui, session, *one, edits, memory),
                 Kind::Light => {
                     heading(ui, session, *one, edits);
                     light(ui, session, *one, edits);
                 }
                 Kind::Material => {
                     heading(ui, session, *one, edits);
-                    own_material(ui, session, *one, edits, ball);
+                    own_material(ui, session, *one, edits, memory);
                 }
                 _ => heading(ui, session, *one, edits),
             },
@@ -91,7 +112,7 @@ fn several_items(ui: &mut Ui, session: &Session, items: &[Item], edits: &mut Edi
     });
 }
 
-fn object(ui: &mut Ui, session: &Session, item: Item, edits: &mut Edits, ball: impl FnOnce(&mut Ui, &Material)) {
+fn object(ui: &mut Ui, session: &Session, item: Item, edits: &mut Edits, memory: &mut Memory) {
     heading(ui, session, item, edits);
     grid(ui, ("shape", item), |ui| {
         shapes::show(ui, session.document(), item, edits);
@@ -108,7 +129,7 @@ fn object(ui: &mut Ui, session: &Session, item: Item, edits: &mut Edits, ball: i
     ui.separator();
     placement(ui, session, item, edits);
     ui.separator();
-    material_of(ui, session, item, edits, ball);
+    material_of(ui, session, item, edits, memory);
 }
 
 fn placement(ui: &mut Ui, session: &Session, item: Item, edits: &mut Edits) {
@@ -137,7 +158,7 @@ fn placement(ui: &mut Ui, session: &Session, item: Item, edits: &mut Edits) {
 }
 
 /// What gives an object another material, or the fields of one that is made for it.
-fn material_of(ui: &mut Ui, session: &Session, object: Item, edits: &mut Edits, ball: impl FnOnce(&mut Ui, &Material)) {
+fn material_of(ui: &mut Ui, session: &Session, object: Item, edits: &mut Edits, memory: &mut Memory) {
     let document = session.document();
     let names = document.names(Kind::Material);
     let own = document.string(object, "material");
@@ -167,8 +188,8 @@ fn material_of(ui: &mut Ui, session: &Session, object: Item, edits: &mut Edits, 
     presets(ui, session, object, own.as_deref(), edits);
     let number = own.and_then(|own| names.iter().position(|name| *name == own));
     match number {
-        Some(index) => own_material(ui, session, Item::material(index), edits, ball),
-        None if is_mesh => imported_materials(ui, session, object, edits),
+        Some(index) => own_material(ui, session, Item::material(index), edits, memory),
+        None if is_mesh => imported_materials(ui, session, memory.imported(session, object.index), edits),
         None => {}
     }
 }
@@ -208,25 +229,16 @@ fn presets(ui: &mut Ui, session: &Session, object: Item, own: Option<&str>, edit
     });
 }
 
-fn own_material(ui: &mut Ui, session: &Session, item: Item, edits: &mut Edits, ball: impl FnOnce(&mut Ui, &Material)) {
+fn own_material(ui: &mut Ui, session: &Session, item: Item, edits: &mut Edits, memory: &mut Memory) {
     let Some(material) = session.material(item.index) else { return };
-    ball(ui, material);
+    memory.ball.show(ui, material);
     terms(ui, session, item, material, edits);
 }
 
 /// The materials that a mesh's file gives: each is changed by an `[[override]]`.
-fn imported_materials(ui: &mut Ui, session: &Session, object: Item, edits: &mut Edits) {
-    let scene = session.scene();
-    let mut used = vec![false; scene.materials.len()];
-    for number in session.instances(object.index) {
-        if let (None, Shape::Mesh(mesh)) = (scene.objects[number].material, scene.objects[number].shape) {
-            used[scene.meshes[mesh as usize].material(0) as usize] = true;
-            if let crate::geometry::mesh::Materials::PerTriangle(each) = &scene.meshes[mesh as usize].materials {
-                each.iter().for_each(|material| used[*material as usize] = true);
-            }
-        }
-    }
-    for (material, _) in scene.materials.iter().zip(used).filter(|(_, used)| *used) {
+fn imported_materials(ui: &mut Ui, session: &Session, imported: &[usize], edits: &mut Edits) {
+    let materials = &session.scene().materials;
+    for material in imported.iter().filter_map(|&number| materials.get(number)) {
         ui.collapsing(&material.name, |ui| {
             let overrides = session.document().count(Kind::Override);
             let index = (0..overrides).find(|&index| {
@@ -269,11 +281,11 @@ fn terms(ui: &mut Ui, session: &Session, item: Item, material: &Material, edits:
             let drag = egui::DragValue::new(&mut opacity).speed(0.005).range(0.0..=1.0).update_while_editing(false);
             let response = ui.add(drag).labelled_by(id);
             if response.changed() && opacity != before {
-                let kt = crate::editor::placement::tidy(1.0 - opacity);
+                let kt = tidy(1.0 - opacity);
                 let mut commands = vec![Command::unset(item, &["opacity"]), Command::set(item, &["kt"], kt)];
                 // Together they must not make light.
                 if kt + short(material.kr.max_element()) > 1.0 {
-                    commands.push(Command::set(item, &["kr"], crate::editor::placement::tidy(1.0 - kt)));
+                    commands.push(Command::set(item, &["kr"], tidy(1.0 - kt)));
                 }
                 edits.moving(&response, Command::All(commands));
             }
@@ -306,7 +318,7 @@ fn light(ui: &mut Ui, session: &Session, item: Item, edits: &mut Edits) {
     let document = session.document();
     let has = |key: &str| document.value(item, &[key]).is_some();
     grid(ui, ("light", item), |ui| {
-        let intensity = document.value(item, &["intensity"]).as_ref().and_then(crate::editor::placement::number);
+        let intensity = document.value(item, &["intensity"]).as_ref().and_then(number);
         let color = intensity.filter(|factor| *factor > 0.0).map_or(light.color, |factor| light.color / factor as f32);
         colored(ui, edits, "color", item, &["color"], color);
         Number { min: 0.0, ..Number::any(intensity.unwrap_or(1.0)) }.show(ui, edits, "intensity", item, &["intensity"]);
@@ -326,7 +338,7 @@ fn light(ui: &mut Ui, session: &Session, item: Item, edits: &mut Edits) {
                 } else {
                     point(ui, edits, "direction", item, &["direction"], direction);
                 }
-                let degrees = |radians: f64| crate::editor::placement::tidy(radians.to_degrees());
+                let degrees = |radians: f64| tidy(radians.to_degrees());
                 Number::between(degrees(inner_angle), 0.0, degrees(outer_angle)).show(
                     ui,
                     edits,
@@ -356,7 +368,7 @@ fn light(ui: &mut Ui, session: &Session, item: Item, edits: &mut Edits) {
 
 fn camera(ui: &mut Ui, session: &Session, edits: &mut Edits) {
     let scene = session.scene();
-    let looking = crate::editor::navigate::Looking::of(scene.camera());
+    let looking = Looking::of(scene.camera());
     if session.document().count(Kind::Camera) == 0 {
         ui.weak("The camera is automatic until the view is moved.");
         return;
@@ -372,7 +384,7 @@ fn camera(ui: &mut Ui, session: &Session, edits: &mut Edits) {
         point(ui, edits, "up", item, &["up"], if looking.up == DVec3::ZERO { DVec3::Y } else { looking.up });
         match looking.projection {
             Projection::Perspective { fov_y } => {
-                let degrees = crate::editor::placement::tidy(fov_y.to_degrees());
+                let degrees = tidy(fov_y.to_degrees());
                 Number { speed: 0.1, min: 1.0, max: 170.0, value: degrees }.show(
                     ui,
                     edits,

@@ -1,7 +1,9 @@
 //! What the editor remembers between runs: recent files, the theme, and scenes that were not saved when it ended.
 
+use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 
+use etcetera::app_strategy::{AppStrategy as _, AppStrategyArgs, choose_native_strategy};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
@@ -34,11 +36,25 @@ pub struct Unsaved {
     pub text: String,
 }
 
+/// A file that is locked while an editor runs.
+#[derive(Debug)]
+pub struct Claim {
+    _file: File,
+    path: PathBuf,
+}
+
+impl Drop for Claim {
+    fn drop(&mut self) {
+        // If it stays, it is not locked any more.
+        let _ = std::fs::remove_file(&self.path);
+    }
+}
+
 impl Settings {
     /// Those of the user, or new ones where they cannot be read.
     pub fn load() -> Self {
-        let folder = directories::ProjectDirs::from("", "", "whitted").map(|dirs| dirs.data_local_dir().to_path_buf());
-        Self::load_from(folder)
+        let names = AppStrategyArgs { app_name: "whitted".into(), ..AppStrategyArgs::default() };
+        Self::load_from(choose_native_strategy(names).ok().map(|strategy| strategy.data_dir()))
     }
 
     /// Those kept in a folder.
@@ -62,6 +78,16 @@ impl Settings {
         if let (Some(folder), Ok(text)) = (&self.folder, toml::to_string(self)) {
             let _ = write(folder, "editor.toml", &text);
         }
+    }
+
+    /// Tells other editors, until it is dropped, that this one runs and comes back for what it keeps.
+    pub fn claim(&self) -> Option<Claim> {
+        let folder = self.folder.as_ref()?;
+        std::fs::create_dir_all(folder).ok()?;
+        let path = folder.join(lock_of(std::process::id()));
+        let file = File::create(&path).ok()?;
+        file.try_lock().ok()?;
+        Some(Claim { _file: file, path })
     }
 
     /// Keeps a scene that is not saved, in case the editor ends.
@@ -93,9 +119,10 @@ impl Settings {
             let name = entry.file_name().to_string_lossy().into_owned();
             let process = name.strip_prefix("unsaved-").and_then(|rest| rest.strip_suffix(".toml"));
             let Some(Ok(process)) = process.map(str::parse::<u32>) else { continue };
-            if process == std::process::id() || is_running(process) {
+            if is_running(folder, process) {
                 continue;
             }
+            let _ = std::fs::remove_file(folder.join(lock_of(process)));
             let text = std::fs::read_to_string(entry.path()).ok();
             let unsaved = text.and_then(|text| toml::from_str(&text).ok());
             let _ = std::fs::remove_file(entry.path());
@@ -107,8 +134,14 @@ impl Settings {
     }
 }
 
-fn is_running(process: u32) -> bool {
-    Path::new("/proc").is_dir() && Path::new("/proc").join(process.to_string()).is_dir()
+/// The name of the file that an editor keeps locked as long as it runs.
+fn lock_of(process: u32) -> String {
+    format!("running-{process}.lock")
+}
+
+fn is_running(folder: &Path, process: u32) -> bool {
+    let lock = File::open(folder.join(lock_of(process)));
+    lock.is_ok_and(|lock| matches!(lock.try_lock(), Err(TryLockError::WouldBlock)))
 }
 
 fn write(folder: &Path, name: &str, text: &str) -> Result<()> {
@@ -135,11 +168,11 @@ mod tests {
         assert_eq!((again.recent.len(), again.recent[0].file_name().unwrap()), (10, "5.toml".as_ref()));
 
         let unsaved = Unsaved { path: None, place: "a.toml".into(), text: "ambient = 0.5 # \"\"\"\n".into() };
+        let claim = settings.claim();
+        assert!(claim.is_some());
         settings.keep(&unsaved).unwrap();
-        assert_eq!(settings.take_left_over(), None, "this process still runs");
-        let mine = folder.path().join("deeper").join(settings.name());
-        // No process has this number: it is larger than any system gives.
-        std::fs::rename(&mine, mine.with_file_name("unsaved-4294967295.toml")).unwrap();
+        assert_eq!(settings.take_left_over(), None, "this editor still runs");
+        drop(claim);
         assert_eq!(settings.take_left_over(), Some(unsaved));
         assert_eq!(settings.take_left_over(), None);
     }

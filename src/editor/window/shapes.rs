@@ -168,3 +168,15 @@ fn coefficients(ui: &mut Ui, value: Option<&Value>, object: Item, edits: &mut Ed
         });
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_shape_of_the_scene_format_has_fields_here() {
+        for shape in crate::formats::scene_file::SHAPES {
+            assert!(SHAPES.iter().any(|(key, _)| *key == shape), "{shape}");
+        }
+    }
+}

@@ -18,5 +18,6 @@ mod write;
 
 pub use assets::{Assets, builtin_names};
 pub use read::{Parsed, parse, parse_with, read};
+pub use shape::SHAPES;
 pub use transform::parse_transform;
 pub use write::{camera_text, light_text, model_scene, save_model_scene};

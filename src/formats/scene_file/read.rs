@@ -61,6 +61,8 @@ pub struct Parsed {
     pub imported_materials: usize,
     /// Whether the lights are those of models, the scene file having none.
     pub imports_lights: bool,
+    /// The boxes of the scene's meshes.
+    pub extents: Extents,
 }
 
 /// [`parse`] with images and models as they were read before.
@@ -98,8 +100,8 @@ pub fn parse_with(
     reader.ledger.note_file(path);
     let automatic = reader.read_scene(&Fields::root(&source, table.get_ref()))?;
     let imported_materials = reader.scene.materials.len() - reader.own_materials.len();
-    let Reader { scene, ledger, entries, imports_lights, .. } = reader;
-    Ok(Parsed { loaded: Loaded { scene, ledger, automatic }, entries, imported_materials, imports_lights })
+    let Reader { scene, ledger, entries, imports_lights, extents, .. } = reader;
+    Ok(Parsed { loaded: Loaded { scene, ledger, automatic }, entries, imported_materials, imports_lights, extents })
 }
 
 /// What marks the number of an object's material as a position in [`Reader::own_materials`] until all models are read.

@@ -38,6 +38,19 @@ pub struct Extent {
     pub max: DVec3,
 }
 
+impl Extent {
+    /// Where a scene has nothing of limited size.
+    pub const ORDINARY: Self = Self { min: DVec3::splat(-5.0), max: DVec3::splat(5.0) };
+
+    /// Its corners; bit k of a corner's number says which side of axis k it is on.
+    pub fn corners(&self) -> [DVec3; 8] {
+        std::array::from_fn(|i| {
+            let pick = |axis: usize| if i >> axis & 1 == 1 { self.max[axis] } else { self.min[axis] };
+            DVec3::new(pick(0), pick(1), pick(2))
+        })
+    }
+}
+
 /// How fine, and how far where a surface has no end.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fineness {
