@@ -5,6 +5,7 @@
 //! [`camera`] says where points are in the picture. What was drawn stays in a picture of its own, which is copied to the
 //! window until something changes.
 
+pub mod batch;
 pub mod camera;
 pub mod decimate;
 pub mod gl;
