@@ -8,13 +8,13 @@ mod grid;
 
 use std::collections::HashMap;
 
-use glam::{DVec2, DVec3, UVec3};
+use glam::{DVec2, DVec3, DVec4, UVec3};
 
 use crate::editor::viewport::tessellate::grid::Grid;
 use crate::geometry::Quadric;
 use crate::geometry::quadric::Mapping;
 use crate::math::quadratic::{Roots, solve};
-use crate::math::vector::{cross, length, normalize};
+use crate::math::vector::{cross, dot, length, normalize};
 
 /// Triangles in a quadric's object space.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -233,10 +233,10 @@ impl March<'_> {
 
     fn vertex(&mut self, place: Place, position: DVec3, surface: u32) -> u32 {
         let result = &mut self.result;
-        let (quadric, grid) = (self.quadric, self.grid);
+        let quadric = self.quadric;
         *self.numbers.entry((place, surface)).or_insert_with(|| {
             let normal = match surface {
-                0 => gradient(quadric, grid, position).unwrap_or(DVec3::ZERO),
+                0 => normal_at(quadric, position).unwrap_or(DVec3::ZERO),
                 cap => DVec3::AXES[(cap as usize - 2) / 2] * if cap % 2 == 1 { 1.0 } else { -1.0 },
             };
             result.positions.push(position);
@@ -255,18 +255,15 @@ impl March<'_> {
 }
 
 /// The unit normal; `None` at an apex.
-fn gradient(quadric: &Quadric, grid: &Grid, p: DVec3) -> Option<DVec3> {
-    // Differences over any step give a quadratic's gradient: over one as large as a cell with little rounding.
-    let step = grid.ticks.iter().map(|ticks| ticks[1] - ticks[0]).fold(f64::INFINITY, f64::min);
-    let mut largest = 0.0f64;
-    let slope = DVec3::AXES.map(|axis| {
-        let (after, before) = (quadric.value(p + axis * step), quadric.value(p - axis * step));
-        largest = largest.max(after.abs()).max(before.abs());
-        after - before
-    });
-    let slope = DVec3::from_array(slope);
-    // Of values that cancel, the last digits are rounding.
-    normalize(slope).filter(|_| slope.abs().max_element() > 1e-9 * largest)
+fn normal_at(quadric: &Quadric, p: DVec3) -> Option<DVec3> {
+    /// Some roundings of f64: sums of terms that cancel to less have no direction.
+    const ROUNDING: f64 = 64.0 * f64::EPSILON;
+    let &[a, b, c, d, e, f, g, h, i, _] = quadric.coefficients();
+    let rows = [DVec4::new(a, d, f, g), DVec4::new(d, b, e, h), DVec4::new(f, e, c, i)];
+    let half_gradient = DVec3::from_array(rows.map(|row| dot(row.truncate(), p) + row.w));
+    let terms = rows.map(|row| dot(row.truncate().abs(), p.abs()) + row.w.abs());
+    let is_certain = half_gradient.abs().max_element() > ROUNDING * DVec3::from_array(terms).max_element();
+    normalize(half_gradient).filter(|_| is_certain)
 }
 
 /// Gives apexes, where the surface has no normal, one for each triangle there.
