@@ -497,32 +497,36 @@ impl Editor {
     }
 }
 
-/// How long frames took, where the variable `WHITTED_EDITOR_TIMES` asks for it: as long as one takes, input waits.
+/// How far apart frames begin while a picture is rendered, where the variable `WHITTED_EDITOR_TIMES` asks for it. At least every
+/// 50 ms one is due: what is more is how long input waits.
 #[derive(Default)]
 struct FrameTimes {
-    seconds: Vec<f32>,
+    last: Option<Instant>,
+    apart: Vec<Duration>,
 }
 
 impl FrameTimes {
-    /// Notes what the frame before took.
-    fn note(&mut self, seconds: Option<f32>) {
+    /// A frame begins.
+    fn note(&mut self, is_rendering: bool) {
+        let before = std::mem::replace(&mut self.last, is_rendering.then(Instant::now));
         if std::env::var_os("WHITTED_EDITOR_TIMES").is_some() {
-            self.seconds.extend(seconds);
+            self.apart.extend(before.filter(|_| is_rendering).map(|before| before.elapsed()));
         }
     }
 
     /// Tells it on standard error.
     fn tell(&mut self) {
-        self.seconds.sort_unstable_by(f32::total_cmp);
-        if let [.., longest] = self.seconds.as_slice() {
-            let (count, median) = (self.seconds.len(), self.seconds[self.seconds.len() / 2]);
-            eprintln!("{count} frames, half of them within {:.1} ms, all within {:.1} ms", median * 1e3, longest * 1e3);
+        self.apart.sort_unstable();
+        if let [.., longest] = self.apart.as_slice() {
+            let (count, middle) = (self.apart.len(), self.apart[self.apart.len() / 2]);
+            eprintln!("{count} frames while rendering, {middle:.1?} apart in the median, {longest:.1?} at most");
         }
     }
 }
 
 impl eframe::App for Editor {
-    fn ui(&mut self, ui: &mut Ui, frame: &mut eframe::Frame) {
+    fn ui(&mut self, ui: &mut Ui, _: &mut eframe::Frame) {
+        self.times.note(self.worker.rendering().is_some());
         self.show(ui);
         let rendered = self.worker.rendering().map(|(_, part, _)| part);
         let title = perform::window_title(&self.session, rendered);
@@ -531,7 +535,6 @@ impl eframe::App for Editor {
             ui.ctx().send_viewport_cmd(egui::ViewportCommand::Title(title.clone()));
             self.title = title;
         }
-        self.times.note(frame.info().cpu_usage);
     }
 
     fn on_exit(&mut self, _gl: Option<&glow::Context>) {
