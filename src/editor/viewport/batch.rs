@@ -30,6 +30,13 @@ pub struct Batch<'a> {
     pub depth: f64,
 }
 
+impl Batch<'_> {
+    /// Triangles of its clusters.
+    pub fn triangle_count(&self) -> u64 {
+        self.parts.iter().map(|part| u64::from(part.end - part.start) / 3).sum()
+    }
+}
+
 /// What is to be drawn: what the camera cannot see is left out.
 pub fn batches<'a>(frame: &Frame<'a>) -> Vec<Batch<'a>> {
     let total = frame.drawing.triangle_count();

@@ -62,6 +62,8 @@ pub struct Stats {
     pub of: u64,
     /// Whether anything had changed since the picture was drawn.
     pub is_new: bool,
+    /// Whether all that the scene has is drawn: large meshes follow once they are prepared.
+    pub is_whole: bool,
 }
 
 /// A preview of a scene in a picture of its own.
@@ -116,7 +118,8 @@ impl Viewport {
     pub fn draw(&mut self, scene: &Arc<Scene>, camera: &Camera, size: (u32, u32), options: &Options) -> Result<Stats> {
         let is_drawn = self.target.as_ref().is_some_and(|target| target.size == size)
             && self.drawn.as_ref().is_some_and(|drawn| {
-                Arc::ptr_eq(&drawn.scene, scene) && drawn.camera == *camera && drawn.options == *options
+                let is_same = Arc::ptr_eq(&drawn.scene, scene) && drawn.camera == *camera && drawn.options == *options;
+                is_same && drawn.stats.is_whole
             });
         if let Some(drawn) = self.drawn.as_ref().filter(|_| is_drawn) {
             return Ok(Stats { is_new: false, ..drawn.stats });
@@ -169,12 +172,14 @@ impl Viewport {
         }
         painter.lines(gl, &frame, &boxes, 2.0, 0.35)?;
         gl.end(target);
-        Ok(Stats { triangles, of: drawing.triangle_count() as u64, is_new: true })
+        let of = drawing.triangle_count() as u64;
+        Ok(Stats { triangles, of, is_new: true, is_whole: !drawing.is_waiting })
     }
 
     /// Makes of a scene what is drawn of it, unless that is done.
     fn prepare(&mut self, scene: &Arc<Scene>) {
-        if self.prepared.as_ref().is_some_and(|prepared| Arc::ptr_eq(&prepared.scene, scene)) {
+        let is_whole = |prepared: &Prepared| Arc::ptr_eq(&prepared.scene, scene) && !prepared.drawing.is_waiting;
+        if self.prepared.as_ref().is_some_and(is_whole) {
             return;
         }
         let drawing = self.preview.drawing(scene);

@@ -61,17 +61,20 @@ struct Variant {
     mirrors: bool,
     images: bool,
     holes: bool,
+    encoded: bool,
 }
 
 impl Variant {
-    fn of(terms: &Terms, lights: &Lights) -> Self {
+    fn of(terms: &Terms, lights: &Lights, is_sieved: bool) -> Self {
+        let images = terms.texture.is_some() || terms.glow_texture.is_some();
         Self {
             lights: lights.places.len(),
             near_lights: lights.places.iter().any(|place| place.w != 0.0),
             glossy: terms.shine != Rgb::ZERO,
             mirrors: terms.mirror != Rgb::ZERO,
-            images: terms.texture.is_some() || terms.glow_texture.is_some(),
+            images,
             holes: terms.cutoff > 0.0,
+            encoded: is_sieved && !images,
         }
     }
 
@@ -83,12 +86,13 @@ impl Variant {
             ("MIRRORS", self.mirrors),
             ("IMAGES", self.images),
             ("HOLES", self.holes),
+            ("ENCODED", self.encoded),
         ] {
             if is_defined {
                 defined += &format!("#define {name}\n");
             }
         }
-        let vertex = format!("{defined}{}", include_str!("shaders/surface.vert"));
+        let vertex = format!("{defined}{ENCODE}{}", include_str!("shaders/surface.vert"));
         let fragment = format!("{defined}{ENCODE}{}", include_str!("shaders/surface.frag"));
         gl.program(&vertex, &fragment, &INPUTS)
     }
@@ -194,7 +198,8 @@ impl Painter {
         let mut in_use = None;
         let mut triangles = 0;
         for batch in batches {
-            let variant = Variant::of(&frame.terms[batch.material as usize], frame.lights);
+            let is_sieved = gl.is_software && !frame.wireframe && batch.triangle_count() >= SIEVED;
+            let variant = Variant::of(&frame.terms[batch.material as usize], frame.lights, is_sieved);
             if let Entry::Vacant(place) = self.surfaces.entry(variant) {
                 place.insert(variant.compiled(gl)?);
             }
@@ -204,12 +209,19 @@ impl Painter {
                 gl.use_program(program);
                 set_frame(gl, frame, program);
             }
-            triangles += self.batch(gl, frame, batch, variant)?;
+            triangles += self.batch(gl, frame, batch, variant, is_sieved)?;
         }
         Ok(triangles)
     }
 
-    fn batch(&mut self, gl: &Gl, frame: &Frame<'_>, batch: &Batch<'_>, variant: Variant) -> Result<u64> {
+    fn batch(
+        &mut self,
+        gl: &Gl,
+        frame: &Frame<'_>,
+        batch: &Batch<'_>,
+        variant: Variant,
+        is_sieved: bool,
+    ) -> Result<u64> {
         let terms = &frame.terms[batch.material as usize];
         let texture = |painter: &mut Self, reference: Option<&crate::scene::TextureRef>| -> Result<Option<Image>> {
             let texture = reference.map(|reference| &frame.scene.textures[reference.texture as usize]);
@@ -256,13 +268,12 @@ impl Painter {
         gl.set_default(2, Vec4::ZERO);
         gl.set_default(3, Vec4::ONE);
         let Some(uploaded) = self.pieces.get(&key(batch)) else { return Ok(0) };
-        let count = batch.parts.iter().map(|part| u64::from(part.end - part.start) / 3).sum();
         match &uploaded.edges {
             Some(edges) if frame.wireframe => {
                 let parts: Vec<_> = batch.parts.iter().map(|part| 2 * part.start..2 * part.end).collect();
                 gl.draw(edges, Shape::Lines, &parts);
             }
-            _ if gl.is_software && count >= SIEVED => {
+            _ if is_sieved => {
                 let rows = clip_rows(frame.view, transform);
                 let indices = sift(batch.piece, &batch.parts, rows, frame.view.size(), batch.sides);
                 gl.draw_listed(&uploaded.geometry, &indices);
@@ -270,7 +281,7 @@ impl Painter {
             }
             _ => gl.draw(&uploaded.geometry, Shape::Triangles, &batch.parts),
         }
-        Ok(count)
+        Ok(batch.triangle_count())
     }
 
     fn upload(&mut self, gl: &Gl, batch: &Batch<'_>, wireframe: bool) -> Result<()> {

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use crate::math::vector::{cross, dot, length, normalize};
 
 /// Triangles of a cluster at most: enough that each is worth a decision, few enough that their normals agree.
-const CLUSTER: usize = 512;
+pub const CLUSTER: usize = 512;
 
 /// A vertex: 20 bytes.
 #[repr(C)]

@@ -10,7 +10,7 @@ use crate::editor::viewport::decimate::decimate;
 use crate::editor::viewport::piece::{Piece, Source};
 use crate::editor::viewport::tessellate::{Extent, Fineness, Tessellation, tessellate};
 use crate::geometry::mesh::Materials;
-use crate::geometry::{Quadric, TriangleMesh};
+use crate::geometry::{Bounds, Quadric, TriangleMesh};
 use crate::math::transform::{Transform, apply, point};
 use crate::scene::{Object, Scene, Shape};
 
@@ -22,6 +22,9 @@ const CELLS: (u32, u32) = (40, 12);
 
 /// So many quadrics are drawn in full fineness.
 const FEW_QUADRICS: usize = 8;
+
+/// Meshes of more triangles are made pieces in the background.
+const AT_ONCE: usize = 100_000;
 
 /// Pieces of fewer triangles need no stand-in, and it is not looked whether they are closed.
 const SMALL: usize = 20_000;
@@ -60,8 +63,18 @@ enum Flatness {
 /// The pieces of scenes, kept while somebody else holds their shapes.
 #[derive(Debug, Default)]
 pub struct Preview {
-    meshes: HashMap<(usize, Flatness), (Arc<TriangleMesh>, Arc<Shown>)>,
+    meshes: HashMap<(usize, Flatness), OfMesh>,
     quadrics: Vec<(Quadric, Fineness, Arc<Shown>)>,
+}
+
+/// A mesh and its piece.
+#[derive(Debug)]
+struct OfMesh {
+    mesh: Arc<TriangleMesh>,
+    /// Empty while it is being made.
+    made: Arc<OnceLock<Arc<Shown>>>,
+    /// Where it will be.
+    bounds: Bounds,
 }
 
 /// All that is drawn of a scene.
@@ -71,25 +84,32 @@ pub struct Drawing {
     pub placed: Vec<Placed>,
     /// The box around what has an end, in the file's coordinates; `None` where nothing has.
     pub extent: Option<Extent>,
+    /// Whether pieces are missing, which are being made.
+    pub is_waiting: bool,
 }
 
 impl Preview {
-    /// What is drawn of a scene. What was made for an earlier one is used again.
+    /// What is drawn of a scene. What was made for an earlier one is used again; large meshes are left out until another thread has made
+    /// them.
     pub fn drawing(&mut self, scene: &Scene) -> Drawing {
         let mut drawing = Drawing::default();
         for (instance, object) in scene.objects.iter().enumerate() {
             if let Shape::Mesh(mesh) = object.shape {
-                let shown = self.mesh(scene, &scene.meshes[mesh as usize], object);
-                drawing.place(shown, instance, object);
+                let mesh = &scene.meshes[mesh as usize];
+                match self.mesh(scene, mesh, object) {
+                    Ok(shown) => drawing.place(shown, instance, object),
+                    Err(bounds) => drawing.wait_for(mesh, &bounds, object),
+                }
             }
         }
-        self.meshes.retain(|_, (mesh, _)| Arc::strong_count(mesh) > 1);
+        self.meshes.retain(|_, known| Arc::strong_count(&known.mesh) > 1);
         self.add_quadrics(scene, &mut drawing);
         drawing.placed.sort_by_key(|placed| placed.instance);
         drawing
     }
 
-    fn mesh(&mut self, scene: &Scene, mesh: &Arc<TriangleMesh>, object: &Object) -> Arc<Shown> {
+    /// A mesh's piece, or where it will be.
+    fn mesh(&mut self, scene: &Scene, mesh: &Arc<TriangleMesh>, object: &Object) -> Result<Arc<Shown>, Bounds> {
         let is_flat = |material: u32| scene.materials[material as usize].flat;
         let flatness = match (&mesh.materials, object.material) {
             _ if mesh.normals.is_none() => Flatness::All,
@@ -106,17 +126,28 @@ impl Preview {
             }
         };
         let key = (Arc::as_ptr(mesh) as usize, flatness);
-        if let Some((_, shown)) = self.meshes.get(&key) {
-            return shown.clone();
+        if let Some(known) = self.meshes.get(&key) {
+            return known.made.get().cloned().ok_or(known.bounds);
         }
-        let piece = match &key.1 {
-            Flatness::None => piece_of_mesh(mesh, &|_| false),
-            Flatness::All => piece_of_mesh(mesh, &|_| true),
-            Flatness::Of(materials) => piece_of_mesh(mesh, &|material| materials.contains(&material)),
+        let made = Arc::new(OnceLock::new());
+        let is_large = mesh.indices.len() > AT_ONCE;
+        let bounds = if is_large { mesh.bounds() } else { Bounds::EMPTY };
+        self.meshes.insert(key.clone(), OfMesh { mesh: mesh.clone(), made: made.clone(), bounds });
+        let (own, mesh) = (made.clone(), mesh.clone());
+        let make = move || {
+            let piece = match &key.1 {
+                Flatness::None => piece_of_mesh(&mesh, &|_| false),
+                Flatness::All => piece_of_mesh(&mesh, &|_| true),
+                Flatness::Of(materials) => piece_of_mesh(&mesh, &|material| materials.contains(&material)),
+            };
+            own.get_or_init(|| Shown::of(piece));
         };
-        let shown = Shown::of(piece);
-        self.meshes.insert(key, (mesh.clone(), shown.clone()));
-        shown
+        if is_large {
+            rayon::spawn(make);
+        } else {
+            make();
+        }
+        made.get().cloned().ok_or(bounds)
     }
 
     fn add_quadrics(&mut self, scene: &Scene, drawing: &mut Drawing) {
@@ -192,6 +223,14 @@ impl Drawing {
             self.include(placed.corners());
         }
         self.placed.push(placed);
+    }
+
+    /// Keeps room for a mesh whose piece is being made.
+    fn wait_for(&mut self, mesh: &TriangleMesh, bounds: &Bounds, object: &Object) {
+        self.is_waiting = true;
+        let (origin, scale) = (mesh.origin, mesh.scale());
+        let corners = Extent { min: bounds.min.as_dvec3(), max: bounds.max.as_dvec3() }.corners();
+        self.include(corners.map(|corner| point(&object.transform, origin + corner * scale)));
     }
 
     fn include(&mut self, corners: [DVec3; 8]) {

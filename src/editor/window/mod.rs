@@ -15,6 +15,7 @@ mod tree;
 mod widgets;
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -61,6 +62,8 @@ pub struct Editor {
     settings: Settings,
     worker: Worker,
     viewport: Option<Arc<Mutex<Viewport>>>,
+    /// Whether the viewport still makes what it draws of large meshes.
+    is_preparing: Arc<AtomicBool>,
     /// Why the scene is not seen while it is edited.
     no_view: Option<String>,
     tool: Tool,
@@ -105,6 +108,7 @@ impl Editor {
             settings,
             worker: Worker::new(wake)?,
             viewport: None,
+            is_preparing: Arc::default(),
             no_view: Some("no OpenGL".into()),
             tool: Tool::Select,
             grid: true,
@@ -381,16 +385,27 @@ impl Editor {
             painter.ctx().request_repaint_after(Duration::from_millis(160));
         }
         let (viewport, scene, size) = (Arc::clone(viewport), Arc::clone(self.session.scene()), frame.pixels());
+        let (is_preparing, ctx) = (Arc::clone(&self.is_preparing), painter.ctx().clone());
         let draw = move |info: egui::PaintCallbackInfo, _: &egui_glow::Painter| {
             let mut viewport = viewport.lock().unwrap_or_else(PoisonError::into_inner);
             let at = info.viewport_in_pixels();
             // A camera that sees nothing shows nothing; the panels tell.
-            if viewport.draw(&scene, scene.camera(), size, &options).is_ok() {
+            if let Ok(stats) = viewport.draw(&scene, scene.camera(), size, &options) {
+                if is_preparing.swap(!stats.is_whole, Ordering::Relaxed) || !stats.is_whole {
+                    ctx.request_repaint_after(Duration::from_millis(30));
+                }
                 viewport.blit([at.left_px, at.from_bottom_px, at.width_px, at.height_px]);
             }
         };
         let callback = Arc::new(egui_glow::CallbackFn::new(draw));
         painter.add(egui::PaintCallback { rect: frame.rect, callback });
+        if self.is_preparing.load(Ordering::Relaxed) {
+            let font = egui::FontId::proportional(15.0);
+            let text = painter.layout_no_wrap("Preparing the view".into(), font, egui::Color32::WHITE);
+            let place = egui::Align2::CENTER_CENTER.anchor_size(frame.rect.center(), text.size());
+            painter.rect_filled(place.expand(8.0), 4.0, egui::Color32::from_black_alpha(160));
+            painter.galley(place.min, text, egui::Color32::WHITE);
+        }
     }
 
     /// Everything in the window.

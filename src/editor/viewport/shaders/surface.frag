@@ -12,8 +12,10 @@ uniform vec3 glow;
 #endif
 // What multiplies alpha; the alpha below which there is nothing; 1 where vertices' and the image's alpha count.
 uniform vec3 alpha;
+#ifndef ENCODED
 uniform float exposure;
 uniform bool is_linear;
+#endif
 
 out vec4 seen;
 
@@ -37,5 +39,9 @@ void main() {
     here = 1.0;
 #endif
     light += v_tinted.rgb * texel.rgb;
+#ifdef ENCODED
+    seen = vec4(light * here, here);
+#else
     seen = vec4(encoded(light * exposure, is_linear) * here, here);
+#endif
 }

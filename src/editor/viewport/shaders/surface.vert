@@ -1,7 +1,8 @@
 // The shading formula at a vertex: what the diffuse texture multiplies, and what it does not.
 //
 // LIGHTS is their number; IMAGES, GLOSSY, MIRRORS and NEAR_LIGHTS are defined where there are such. Where the processor draws,
-// both ways of a branch take their time.
+// both ways of a branch take their time. ENCODED is defined where triangles are so small that colours may be made bytes'
+// at vertices.
 in vec3 position;
 in vec4 normal;
 #ifdef IMAGES
@@ -37,6 +38,11 @@ uniform vec4 uv_matrix;
 uniform vec4 uv_offset;
 uniform vec4 glow_matrix;
 uniform vec4 glow_offset;
+#endif
+
+#ifdef ENCODED
+uniform float exposure;
+uniform bool is_linear;
 #endif
 
 out vec4 v_tinted;
@@ -107,5 +113,8 @@ void main() {
     v_plain = plain;
 #else
     v_tinted.rgb += plain;
+#endif
+#ifdef ENCODED
+    v_tinted.rgb = encoded(v_tinted.rgb * exposure, is_linear);
 #endif
 }
