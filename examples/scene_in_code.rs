@@ -51,7 +51,7 @@ fn scene() -> whitted::Result<Scene> {
     Ok(Scene {
         film: FilmSettings { width: 480, height: 320, samples: 4, ..FilmSettings::default() },
         background: Background::Gradient { bottom: Rgb::ONE, top: Rgb::new(0.15, 0.3, 0.6), up: DVec3::Y },
-        cameras: vec![NamedCamera { name: "main".into(), camera }],
+        cameras: vec![NamedCamera::new("main", camera)],
         lights: vec![light("lamp", lamp, Rgb::splat(0.7)), light("sun", sun, Rgb::new(0.3, 0.28, 0.22))],
         materials: vec![
             Material { diffuse_texture: Some(tiles), ..material("floor", Rgb::ONE, 0.05) },

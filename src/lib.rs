@@ -38,11 +38,12 @@
 //! | [`accel`] | structures over triangles, and the tree over instances |
 //! | [`render`] | the seed's call graph: ray_tracing, trace, intersect, shade |
 //! | [`formats`] | OBJ, glTF and scene files in, pictures out |
+//! | [`job`] | tiles that are kept, shared and merged |
 //! | `measure` | exact answers, the hard cases, speed against error, the bench, behind the feature `measure` |
 //! | `editor` | a scene edited by commands, and the window that shows it, behind the feature `editor` |
 //! | `cli` | the command line, behind the feature `cli` |
 //!
-//! Imports go one way: `math, error, progress -> geometry -> {scene, accel} -> render -> formats -> measure ->
+//! Imports go one way: `math, error, progress -> geometry -> {scene, accel} -> render -> formats -> job -> measure ->
 //! editor -> cli`; a test reads the source and fails on a backward one. `scene` and `accel` do not know each other and meet in
 //! [`render::intersect`]. Below `editor` nothing prints, reads arguments or exits.
 //!
@@ -67,6 +68,7 @@ pub mod editor;
 pub mod error;
 pub mod formats;
 pub mod geometry;
+pub mod job;
 pub mod manual;
 pub mod math;
 #[cfg(feature = "measure")]

@@ -9,6 +9,7 @@ const LAYERS: &[&[&str]] = &[
     &["scene", "accel"],
     &["render"],
     &["formats"],
+    &["job"],
     &["measure"],
     &["editor"],
     &["cli", "manual"],

@@ -25,7 +25,7 @@ pub fn look(scene: &mut Scene, eye: DVec3, target: DVec3) {
     let forward = (target - eye).normalize();
     let up = if forward.y.abs() > 0.9 { DVec3::Z } else { DVec3::Y };
     let projection = Projection::Perspective { fov_y: 1f64.to_radians() };
-    scene.cameras = vec![NamedCamera { name: "test".into(), camera: Camera::LookAt { eye, target, up, projection } }];
+    scene.cameras = vec![NamedCamera::new("test", Camera::LookAt { eye, target, up, projection })];
 }
 
 /// Adds a quadric with a material of its own.

@@ -81,7 +81,7 @@ pub fn everything() -> Scene {
     add_light(&mut scene, DVec3::new(-5.0, 1.0, 3.0), Rgb::new(0.3, 0.2, 0.2));
     let projection = Projection::Perspective { fov_y: 0.7 };
     let (eye, target, up) = (DVec3::new(0.5, 0.6, 6.0), DVec3::ZERO, DVec3::Y);
-    scene.cameras = vec![NamedCamera { name: "all".into(), camera: Camera::LookAt { eye, target, up, projection } }];
+    scene.cameras = vec![NamedCamera::new("all", Camera::LookAt { eye, target, up, projection })];
     scene
 }
 
@@ -101,7 +101,7 @@ pub fn coloured_and_plain_squares(count: u32) -> Scene {
     add_light(&mut scene, DVec3::new(1.0, 2.0, 9.0), Rgb::ONE);
     let projection = Projection::Perspective { fov_y: 0.5 };
     let (eye, target, up) = (DVec3::new(0.0, 0.0, 4.5), DVec3::ZERO, DVec3::Y);
-    scene.cameras = vec![NamedCamera { name: "all".into(), camera: Camera::LookAt { eye, target, up, projection } }];
+    scene.cameras = vec![NamedCamera::new("all", Camera::LookAt { eye, target, up, projection })];
     scene
 }
 

@@ -504,7 +504,7 @@ fn a_camera_without_a_ray_is_black() {
         lower_right: DVec3::X,
         upper_left: DVec3::Y,
     };
-    scene.cameras = vec![NamedCamera { name: "corner".into(), camera }];
+    scene.cameras = vec![NamedCamera::new("corner", camera)];
     let film = render(&scene);
     let renderer = build(scene);
     let blind = all(&renderer, 0, 1);

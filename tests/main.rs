@@ -16,6 +16,7 @@ mod far_from_origin;
 mod golden;
 mod golden_models;
 mod hard_cases;
+mod jobs;
 mod memory;
 mod metamorphic;
 mod models;

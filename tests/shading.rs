@@ -301,7 +301,7 @@ fn a_whole_picture_agrees_with_the_seeds_formula_to_a_millionth() {
     let (width, height) = (64u32, 48u32);
     let mut scene = empty_scene();
     let camera = Camera::FourPoint { viewpoint, lower_left, lower_right, upper_left };
-    scene.cameras = vec![NamedCamera { name: "seed".into(), camera }];
+    scene.cameras = vec![NamedCamera::new("seed", camera)];
     scene.film =
         FilmSettings { width, height, samples: 1, max_depth: 5, clamp: Clamp::Shade, ..FilmSettings::default() };
     for s in seed::surfaces() {

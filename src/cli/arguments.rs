@@ -10,6 +10,7 @@ use super::check::CheckArguments;
 use super::diff::DiffArguments;
 use super::edit::EditArguments;
 use super::explain::ExplainArguments;
+use super::job::{JobArguments, MergeArguments};
 use super::memory_limit::kind_within;
 use super::precision::Precision;
 use super::query::QueryArguments;
@@ -40,6 +41,8 @@ pub struct Arguments {
 pub enum Command {
     /// Render a scene file (.toml) or a model (.obj, .gltf, .glb) to a picture.
     Render(Box<RenderArguments>),
+    /// Make one picture of the parts that several processes or machines rendered.
+    Merge(MergeArguments),
     /// Tell what a scene or model holds and needs, without rendering it.
     Info(InfoArguments),
     /// Tell how far two pictures are apart.
@@ -111,6 +114,9 @@ pub struct RenderArguments {
     /// How trees are built.
     #[command(flatten)]
     pub build: BuildArguments,
+    /// What of it is rendered here, and until when.
+    #[command(flatten)]
+    pub job: JobArguments,
 }
 
 /// Flags that replace those fields of the scene's film on which linear values depend.
@@ -345,7 +351,13 @@ impl RenderArguments {
     /// As the renderer takes them; a kind of extra values that was named twice counts once.
     pub fn settings(&self) -> RenderSettings {
         let aovs = AovKind::ALL.into_iter().filter(|kind| self.aov.contains(kind)).collect();
-        RenderSettings { threads: self.build.threads as usize, crop: self.film.crop, aovs, coverage: self.verbose }
+        RenderSettings {
+            threads: self.build.threads as usize,
+            crop: self.film.crop,
+            aovs,
+            tiles: None,
+            coverage: self.verbose,
+        }
     }
 }
 

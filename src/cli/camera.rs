@@ -26,7 +26,7 @@ pub fn choose(scene: &mut Scene, automatic: Automatic, arguments: &CameraArgumen
     if let Some((azimuth, elevation)) = arguments.view.map(View::angles).or(orbit) {
         let camera = auto::frame(scene, azimuth, elevation, arguments.fov.unwrap_or(default_fov()));
         scene.active_camera = scene.cameras.len();
-        scene.cameras.push(NamedCamera { name: NAME.into(), camera });
+        scene.cameras.push(NamedCamera::new(NAME, camera));
     } else if automatic.camera {
         if resized || arguments.fov.is_some() {
             scene.cameras[scene.active_camera].camera =
@@ -71,7 +71,7 @@ mod tests {
 
     fn scene() -> Scene {
         let look = |projection| Camera::LookAt { eye: DVec3::Z, target: DVec3::ZERO, up: DVec3::Y, projection };
-        let named = |name: &str, camera| NamedCamera { name: name.into(), camera };
+        let named = |name: &str, camera| NamedCamera::new(name, camera);
         Scene {
             cameras: vec![
                 named("wide", look(Projection::Perspective { fov_y: 1.0 })),

@@ -376,7 +376,7 @@ mod tests {
             ..Default::default()
         };
         let camera = auto::frame(&scene, 0.0, 0.0, 0.5);
-        scene.cameras.push(NamedCamera { name: "only".into(), camera });
+        scene.cameras.push(NamedCamera::new("only", camera));
         scene
     }
 

@@ -18,6 +18,7 @@ mod explain;
 mod explain_text;
 mod info;
 mod info_text;
+mod job;
 mod ledger;
 mod memory_limit;
 mod outputs;
@@ -43,6 +44,8 @@ use arguments::Command;
 const FAILED: u8 = 1;
 /// Exit code of a command that was interrupted: 128 and the number of SIGINT, as shells have it.
 const INTERRUPTED: u8 = 130;
+/// Exit code of a command whose time was over: what sysexits.h has for a failure that another try may mend.
+const OUT_OF_TIME: u8 = 75;
 
 /// Runs a subcommand.
 ///
@@ -58,6 +61,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     match &arguments.command {
         Command::Render(arguments) => render::run(arguments),
+        Command::Merge(arguments) => job::merge(arguments),
         Command::Info(arguments) => info::run(arguments),
         Command::Diff(arguments) => diff::run(arguments),
         Command::Check(arguments) => check::run(arguments),
@@ -70,10 +74,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
 }
 
-/// Reports an error in one line on standard error and says what the process ends with: 0, 1 or 130.
+/// Reports an error in one line on standard error and says what the process ends with: 0, 1, 75 or 130.
 pub fn exit_code(result: Result<()>) -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
+        Err(error) if error.fault() == Fault::Cancelled && terminal::was_stopped_by_time() => {
+            terminal::report("stopped: the time limit was reached");
+            ExitCode::from(OUT_OF_TIME)
+        }
         Err(error) if error.fault() == Fault::Cancelled => ExitCode::from(INTERRUPTED),
         Err(error) => {
             terminal::report(&format!("error: {}", one_line(&error)));

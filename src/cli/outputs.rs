@@ -1,12 +1,17 @@
 //! The files that a rendering writes: named, checked and protected before anything is rendered.
 
 use std::fs;
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use super::arguments::RenderArguments;
 use crate::error::{Error, Result};
 use crate::formats::atomic_file::{check_writable, write_atomically};
-use crate::formats::picture::PictureFormat;
+use crate::formats::picture::{self, PictureFormat};
+use crate::render::Film;
+
+/// What stands for a frame's number in the picture's name.
+const FRAME: &str = "{frame}";
 
 /// Where the picture goes.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -36,6 +41,8 @@ pub struct Outputs {
     pub aov_file: Option<PathBuf>,
     /// What was finished of an interrupted picture.
     pub partial: Option<PathBuf>,
+    /// A share of the picture's tiles, instead of the picture.
+    pub part: Option<PathBuf>,
     /// The scene that was chosen for a model.
     pub scene: Option<PathBuf>,
     /// Rays, times and memory.
@@ -56,30 +63,97 @@ impl Outputs {
                 PictureFormat::of(path)?;
                 Picture::File(path.clone())
             }
-            None => Picture::File(default_picture(&arguments.input)?),
+            None => Picture::File(default_picture(&arguments.input, arguments.job.frame_range().is_some())?),
         };
-        let (aov_file, partial) = match &picture {
-            Picture::File(path) => {
-                let apart = !arguments.aov.is_empty() && !PictureFormat::of(path)?.has_layers();
-                (apart.then(|| path.with_extension("aov.exr")), Some(path.with_extension("partial.png")))
-            }
-            Picture::Stdout if arguments.aov.is_empty() => (None, None),
-            Picture::Stdout => {
-                return Err(Error::caller("extra values have no file to go to when the picture is streamed")
-                    .remedy("name a file with -o, or leave out --aov"));
-            }
-        };
-        let outputs = Self {
-            picture,
-            aov_file,
-            partial,
-            scene: arguments.save_scene.clone(),
-            stats: arguments.stats_json.clone(),
-            no_clobber: arguments.no_clobber,
-        };
+        let is_pattern = picture.path().is_some_and(|path| path.to_string_lossy().contains(FRAME));
+        if arguments.job.frame_range().is_some() != is_pattern {
+            let error = Error::caller(if is_pattern {
+                format!("the picture's name has {FRAME}, but there are no frames")
+            } else {
+                "all frames would go to one file".into()
+            });
+            let error = picture.path().into_iter().fold(error, Error::at_path);
+            return Err(error.remedy(if is_pattern {
+                "say --frames A..B, or leave it out of the name".into()
+            } else {
+                format!("put {FRAME} into the name, such as turn.{FRAME}.png")
+            }));
+        }
+        if let (Picture::Stdout, true) = (&picture, arguments.job.writes_tiles()) {
+            return Err(Error::caller(
+                "--resume and --part write tiles beside the picture, which has no file when it is streamed",
+            )
+            .remedy("name a file with -o"));
+        }
+        let mut outputs = Self::of_picture(picture, !arguments.aov.is_empty(), arguments.no_clobber)?;
+        outputs.scene = arguments.save_scene.clone();
+        outputs.stats = arguments.stats_json.clone();
+        outputs.part = outputs.picture.path().and_then(|path| arguments.job.part_file(path));
+        if outputs.part.is_some() || arguments.job.resume {
+            outputs.partial = None;
+        }
         outputs.refuse_inputs([arguments.input.as_path()])?;
         outputs.check()?;
         Ok(outputs)
+    }
+
+    /// A picture, what goes beside it, and nothing else.
+    ///
+    /// # Errors
+    /// A picture whose suffix names no format, or one that is streamed and has extra values.
+    pub fn of_picture(picture: Picture, has_aovs: bool, no_clobber: bool) -> Result<Self> {
+        let (aov_file, partial) = match &picture {
+            Picture::File(path) => {
+                let apart = has_aovs && !PictureFormat::of(path)?.has_layers();
+                (apart.then(|| path.with_extension("aov.exr")), Some(path.with_extension("partial.png")))
+            }
+            Picture::Stdout if has_aovs => {
+                return Err(Error::caller("extra values have no file to go to when the picture is streamed")
+                    .remedy("name a file with -o, or leave out --aov"));
+            }
+            Picture::Stdout => (None, None),
+        };
+        Ok(Self { picture, aov_file, partial, part: None, scene: None, stats: None, no_clobber })
+    }
+
+    /// The files of one frame, whose number takes the place of `{frame}`, with four digits at least.
+    ///
+    /// # Errors
+    /// A file that exists and must not be replaced.
+    pub fn for_frame(&self, frame: i32) -> Result<Self> {
+        let named = |path: &PathBuf| PathBuf::from(path.to_string_lossy().replace(FRAME, &format!("{frame:04}")));
+        let outputs = Self {
+            picture: match &self.picture {
+                Picture::Stdout => Picture::Stdout,
+                Picture::File(path) => Picture::File(named(path)),
+            },
+            aov_file: self.aov_file.as_ref().map(named),
+            partial: self.partial.as_ref().map(named),
+            part: None,
+            scene: self.scene.clone(),
+            stats: None,
+            no_clobber: self.no_clobber,
+        };
+        let pictures = outputs.picture.path().into_iter().chain(outputs.aov_file.as_deref());
+        pictures.into_iter().try_for_each(|path| outputs.refuse_clobber(path))?;
+        Ok(outputs)
+    }
+
+    /// Writes a picture, and its extra values where they go to a file of their own.
+    ///
+    /// # Errors
+    /// Those of writing.
+    pub fn write(&self, film: &Film) -> Result<()> {
+        match &self.picture {
+            Picture::Stdout => write_to_stdout(film)?,
+            Picture::File(path) => picture::save(film, path)?,
+        }
+        self.aov_file.as_deref().map_or(Ok(()), |path| picture::save(film, path))
+    }
+
+    /// The file that the tiles of this process go to: the part's, or else the picture's.
+    pub fn target(&self) -> Option<&Path> {
+        self.part.as_deref().or(self.picture.path())
     }
 
     /// Refuses to write over any of the files that were read.
@@ -93,9 +167,11 @@ impl Outputs {
 
     /// The files that a finished rendering writes.
     fn files(&self) -> impl Iterator<Item = &Path> {
-        [self.picture.path(), self.aov_file.as_deref(), self.scene.as_deref(), self.stats.as_deref()]
-            .into_iter()
-            .flatten()
+        let picture = match &self.part {
+            Some(part) => [Some(part.as_path()), None],
+            None => [self.picture.path(), self.aov_file.as_deref()],
+        };
+        picture.into_iter().chain([self.scene.as_deref(), self.stats.as_deref()]).flatten()
     }
 
     /// Fails if the file exists and must stay.
@@ -112,7 +188,11 @@ impl Outputs {
             .remedy("name another file, or leave out --no-clobber"))
     }
 
-    fn check(&self) -> Result<()> {
+    /// Finds out whether all of them can be written.
+    ///
+    /// # Errors
+    /// Names the first that cannot.
+    pub fn check(&self) -> Result<()> {
         let mut taken = Vec::new();
         for path in self.files() {
             self.refuse_clobber(path)?;
@@ -143,6 +223,13 @@ pub(super) fn refuse_inputs<'a>(output: &Path, inputs: impl IntoIterator<Item = 
     Ok(())
 }
 
+/// Unlike text, a picture that its reader cut short is a failure: it did not arrive.
+fn write_to_stdout(film: &Film) -> Result<()> {
+    let mut stdout = BufWriter::new(io::stdout().lock());
+    picture::write_png(film, &mut stdout)?;
+    stdout.flush().map_err(|error| Error::system(Path::new("standard output"), error))
+}
+
 /// Writes a text file whole or not at all.
 ///
 /// # Errors
@@ -152,13 +239,17 @@ pub fn write_text(path: &Path, text: &str) -> Result<()> {
 }
 
 /// The input's name with `.png`, in the current folder.
-fn default_picture(input: &Path) -> Result<PathBuf> {
+fn default_picture(input: &Path, is_pattern: bool) -> Result<PathBuf> {
     let stem = input.file_stem().ok_or_else(|| {
         Error::caller("this is no file")
             .at_path(input)
             .remedy("give a scene file (.toml) or a model (.obj, .gltf, .glb)")
     })?;
     let mut name = stem.to_os_string();
+    if is_pattern {
+        name.push(".");
+        name.push(FRAME);
+    }
     name.push(".png");
     Ok(name.into())
 }
@@ -204,8 +295,8 @@ mod tests {
         let layered = folder.path().join("a.EXR");
         let outputs = plan(&input, &["-o", layered.to_str().unwrap(), "--aov", "depth"]).unwrap();
         assert_eq!((outputs.picture, outputs.aov_file), (Picture::File(layered), None));
-        assert_eq!(default_picture(Path::new("models/duck.v2.glb")).unwrap(), Path::new("duck.v2.png"));
-        assert!(default_picture(Path::new("..")).is_err());
+        assert_eq!(default_picture(Path::new("models/duck.v2.glb"), false).unwrap(), Path::new("duck.v2.png"));
+        assert!(default_picture(Path::new(".."), false).is_err());
     }
 
     #[test]

@@ -4,8 +4,8 @@ use crate::accel::Params;
 use crate::error::Result;
 use crate::measure::reference::ReferenceRenderer;
 use crate::progress::Progress;
-use crate::render::{BuildStats, Film, RenderSettings, Renderer};
-use crate::scene::Scene;
+use crate::render::{BuildStats, Film, RenderSettings, Renderer, Tile};
+use crate::scene::{Camera, Scene};
 
 /// In what rays are traced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -39,11 +39,24 @@ impl AnyRenderer {
         })
     }
 
-    /// Renders the scene.
-    pub fn render(&self, settings: &RenderSettings, progress: &dyn Progress) -> Result<Film> {
+    /// Renders the scene; each tile is shown to `finished` once it is.
+    pub fn render_tiles(
+        &self,
+        settings: &RenderSettings,
+        progress: &dyn Progress,
+        finished: &(dyn Fn(&Tile) + Sync),
+    ) -> Result<Film> {
         match self {
-            Self::F32(renderer) => renderer.render(settings, progress),
-            Self::F64(renderer) => renderer.render(settings, progress),
+            Self::F32(renderer) => renderer.render_tiles(settings, progress, finished),
+            Self::F64(renderer) => renderer.render_tiles(settings, progress, finished),
+        }
+    }
+
+    /// Puts another camera in the place of the active one.
+    pub fn look_through(&mut self, camera: Camera) {
+        match self {
+            Self::F32(renderer) => renderer.look_through(camera),
+            Self::F64(renderer) => renderer.look_through(camera),
         }
     }
 

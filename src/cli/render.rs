@@ -1,42 +1,49 @@
 //! `whitted render`.
 
-use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 use super::arguments::RenderArguments;
 use super::ledger::{self, Told};
 use super::memory_limit::picture_bytes;
-use super::outputs::{Outputs, Picture};
+use super::outputs::Outputs;
 use super::precision::{AnyRenderer, Precision};
 use super::stats_json::{Bytes, SCHEMA, Seconds, Settings, Stats, timed};
 use super::terminal::{self, Terminal};
-use super::{camera, outputs};
+use super::{camera, job, outputs};
 use crate::error::{Error, Result};
 use crate::formats::reach::PixelCounts;
 use crate::formats::{self, Ledger, picture};
+use crate::job::Header;
 use crate::progress::Progress;
-use crate::render::{Crop, Film};
-use crate::scene::{FilmSettings, Scene};
+use crate::render::{Crop, Film, RenderSettings};
+use crate::scene::{FilmSettings, NamedCamera, Scene};
 
 /// Renders a picture and writes all that was asked for.
 ///
 /// # Errors
 /// Whatever stops it; [`Error::cancelled`] after Ctrl-C, when the picture's file is left as it was.
 pub fn run(arguments: &RenderArguments) -> Result<()> {
+    if let Some(limit) = arguments.job.time_limit {
+        terminal::set_time_limit(limit);
+    }
     let outputs = Outputs::plan(arguments)?;
     if outputs.scene.is_some() && formats::is_scene(&arguments.input)? {
         return Err(Error::caller("this is a scene file already; only what was chosen for a model can be saved")
             .at_path(&arguments.input)
             .remedy("leave out --save-scene"));
     }
+    let mut pictures: Vec<(Option<i32>, Outputs)> = match arguments.job.frames_here() {
+        None => vec![(None, outputs)],
+        Some(frames) => frames.map(|frame| Ok((Some(frame), outputs.for_frame(frame)?))).collect::<Result<_>>()?,
+    };
+    let is_there = |outputs: &Outputs| outputs.target().is_some_and(Path::exists);
+    pictures.retain(|(_, outputs)| !(arguments.job.skip_existing && is_there(outputs)));
+    if pictures.is_empty() {
+        return Ok(());
+    }
     let terminal = Terminal::new(arguments.quiet)?;
     super::use_threads(arguments.build.threads)?;
     let mut seconds = Seconds::default();
-    let report_time = |stage: &str, seconds: f64| {
-        if arguments.verbose {
-            terminal::report(&format!("{stage:8} {seconds:9.3} s"));
-        }
-    };
 
     let options = arguments.load.options();
     let loaded;
@@ -46,8 +53,8 @@ pub fn run(arguments: &RenderArguments) -> Result<()> {
     // With --verbose they come with all else, once it is known in how many pixels they are seen.
     let told = if arguments.quiet || arguments.verbose { Told::Nothing } else { Told::Warnings };
     ledger::report(&arguments.input, &ledger, &scene, told, arguments.load.strict)?;
-    outputs.refuse_inputs(ledger.files())?;
-    report_time("load", seconds.load);
+    pictures.iter().try_for_each(|(_, outputs)| outputs.refuse_inputs(ledger.files()))?;
+    report_time(arguments, "load", seconds.load);
     terminal.check()?;
     arguments.film.apply(&mut scene.film);
     if let Some(crop) = arguments.film.crop {
@@ -55,7 +62,8 @@ pub fn run(arguments: &RenderArguments) -> Result<()> {
     }
     let resized = arguments.film.values.size.is_some();
     camera::choose(&mut scene, automatic, &arguments.camera, resized)?;
-    if let Some(path) = &outputs.scene {
+    arguments.job.move_camera(&mut scene)?;
+    if let Some(path) = &pictures[0].1.scene {
         formats::scene_file::save_model_scene(&scene, &arguments.input, &options, path)?;
     }
 
@@ -63,41 +71,94 @@ pub fn run(arguments: &RenderArguments) -> Result<()> {
     if arguments.precision == Precision::F64 {
         arguments.build.refuse_limit("--precision f64")?;
     }
+    let header = arguments
+        .job
+        .writes_tiles()
+        .then(|| job::header(&arguments.input, &ledger, &scene, &settings, &arguments.load, arguments.precision));
+    let header = header.transpose()?;
+    let camera = scene.cameras[scene.active_camera].clone();
     let picture = picture_bytes(&scene.film, settings.crop, &settings.aovs);
     let params = arguments.build.params(&scene, picture)?;
     let renderer;
     (renderer, seconds.build) = timed(|| AnyRenderer::build(scene, arguments.precision, &params, &terminal));
     terminal.clear();
     let renderer = renderer?;
-    report_time("build", seconds.build);
+    report_time(arguments, "build", seconds.build);
 
-    let film;
-    (film, seconds.render) = timed(|| renderer.render(&settings, &terminal));
-    terminal.clear();
-    let film = film?;
-    report_time("render", seconds.render);
-    if arguments.verbose {
-        report_ledger(&ledger, renderer.scene(), &film);
-    }
-    if !film.complete {
-        return Err(save_partial(&film, &outputs, arguments.quiet));
+    let mut work = Work { arguments, ledger, settings, header, camera, renderer, seconds, terminal: &terminal };
+    pictures.iter().try_for_each(|(frame, outputs)| work.picture(*frame, outputs))
+}
+
+/// A scene that is built, and what its pictures have in common.
+struct Work<'a> {
+    arguments: &'a RenderArguments,
+    ledger: Ledger,
+    settings: RenderSettings,
+    /// Without a frame and a share.
+    header: Option<Header>,
+    /// The camera, and how it moves.
+    camera: NamedCamera,
+    renderer: AnyRenderer,
+    seconds: Seconds,
+    terminal: &'a Terminal,
+}
+
+impl Work<'_> {
+    /// Renders one picture, or a share of it, and writes all that belongs to it.
+    fn picture(&mut self, frame: Option<i32>, outputs: &Outputs) -> Result<()> {
+        let Self { arguments, ledger, settings, header, camera, renderer, seconds, terminal } = self;
+        if let Some(frame) = frame {
+            renderer.look_through(camera.in_frame(frame));
+        }
+        let share = outputs.part.as_ref().and(arguments.job.part);
+        let header = header.as_ref().filter(|_| share.is_some() || arguments.job.resume);
+        let header = header.map(|header| Header { frame, share, ..header.clone() });
+        let resume = arguments.job.resume;
+        let film;
+        (film, seconds.render) = timed(|| match (&header, outputs.target()) {
+            (Some(header), Some(target)) => job::render(renderer, header, settings, target, resume, terminal),
+            _ => renderer.render_tiles(settings, *terminal, &|_| ()),
+        });
+        terminal.clear();
+        let film = film?;
+        report_time(arguments, "render", seconds.render);
+        if arguments.verbose {
+            report_ledger(ledger, renderer.scene(), &film);
+        }
+        if !film.complete {
+            return Err(save_partial(&film, outputs, arguments.quiet));
+        }
+        if outputs.part.is_none() {
+            let written;
+            (written, seconds.write) = timed(|| outputs.write(&film));
+            written?;
+        }
+        if let Some(target) = outputs.target().filter(|_| resume) {
+            job::forget(target)?;
+        }
+        report_time(arguments, "write", seconds.write);
+        if arguments.verbose {
+            report_rays(&film, seconds.render);
+        }
+        if let Some(path) = &outputs.stats {
+            outputs::write_text(path, &self.stats(&film, outputs))?;
+        }
+        match outputs.target() {
+            Some(path) if !self.arguments.quiet => terminal::print(format!("{}\n", path.display()).as_bytes()),
+            _ => Ok(()),
+        }
     }
 
-    let written;
-    (written, seconds.write) = timed(|| write(&film, &outputs));
-    written?;
-    report_time("write", seconds.write);
-    if arguments.verbose {
-        report_rays(&film, seconds.render);
-    }
-    if let Some(path) = &outputs.stats {
+    /// Rays, times and memory as JSON.
+    fn stats(&self, film: &Film, outputs: &Outputs) -> String {
+        let Self { arguments, settings, renderer, seconds, .. } = self;
         let scene = renderer.scene();
         let build = renderer.build_stats();
         let stats = Stats {
             schema: SCHEMA,
             version: env!("CARGO_PKG_VERSION"),
             input: &arguments.input,
-            output: outputs.picture.path(),
+            output: outputs.target(),
             settings: Settings {
                 film: scene.film,
                 camera: &scene.cameras[scene.active_camera].name,
@@ -110,16 +171,18 @@ pub fn run(arguments: &RenderArguments) -> Result<()> {
             },
             rays: film.stats.rays.into(),
             rays_per_second: film.stats.rays.total() as f64 / seconds.render.max(f64::MIN_POSITIVE),
-            seconds,
+            seconds: *seconds,
             thread_seconds: film.stats.thread_seconds,
-            bytes: Bytes::of(scene, build, &film),
+            bytes: Bytes::of(scene, build, film),
         };
-        let text = serde_json::to_string_pretty(&stats).expect("names and numbers have a JSON form");
-        outputs::write_text(path, &(text + "\n"))?;
+        serde_json::to_string_pretty(&stats).expect("names and numbers have a JSON form") + "\n"
     }
-    match &outputs.picture {
-        Picture::File(path) if !arguments.quiet => terminal::print(format!("{}\n", path.display()).as_bytes()),
-        _ => Ok(()),
+}
+
+/// The time of a stage, where that is asked for.
+fn report_time(arguments: &RenderArguments, stage: &str, seconds: f64) {
+    if arguments.verbose {
+        terminal::report(&format!("{stage:8} {seconds:9.3} s"));
     }
 }
 
@@ -134,21 +197,6 @@ fn check_crop(crop: Crop, film: &FilmSettings) -> Result<()> {
         "the crop {x0},{y0},{x1},{y1} reaches beyond the picture, which has {width}x{height} pixels"
     ))
     .remedy(format!("X1 can be {width} and Y1 {height} at most")))
-}
-
-fn write(film: &Film, outputs: &Outputs) -> Result<()> {
-    match &outputs.picture {
-        Picture::Stdout => write_to_stdout(film)?,
-        Picture::File(path) => picture::save(film, path)?,
-    }
-    outputs.aov_file.as_deref().map_or(Ok(()), |path| picture::save(film, path))
-}
-
-/// Unlike text, a picture that its reader cut short is a failure: it did not arrive.
-fn write_to_stdout(film: &Film) -> Result<()> {
-    let mut stdout = BufWriter::new(io::stdout().lock());
-    picture::write_png(film, &mut stdout)?;
-    stdout.flush().map_err(|error| Error::system(Path::new("standard output"), error))
 }
 
 /// Writes what an interrupted rendering finished. The error it gives is that of the interrupt, or of the writing.

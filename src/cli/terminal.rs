@@ -3,7 +3,9 @@
 use std::borrow::Cow;
 use std::io::{self, IsTerminal, Write};
 use std::path::Path;
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 use indicatif::{HumanDuration, ProgressBar, ProgressState, ProgressStyle};
 
@@ -12,6 +14,24 @@ use crate::progress::Progress;
 
 /// Whether Ctrl-C was pressed.
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+
+/// When the work is to stop.
+static DEADLINE: OnceLock<Instant> = OnceLock::new();
+
+/// Lets the work stop after a time from now.
+pub fn set_time_limit(limit: Duration) {
+    let _ = DEADLINE.set(Instant::now() + limit);
+}
+
+/// Whether the time is over.
+pub fn is_out_of_time() -> bool {
+    DEADLINE.get().is_some_and(|deadline| Instant::now() >= *deadline)
+}
+
+/// Whether it was the time that stopped the work, not Ctrl-C.
+pub fn was_stopped_by_time() -> bool {
+    !INTERRUPTED.load(Ordering::Relaxed) && is_out_of_time()
+}
 
 /// Writes a result to standard output. A reader that went away wanted no more, which is no error.
 ///
@@ -91,7 +111,7 @@ impl Progress for Terminal {
     }
 
     fn is_cancelled(&self) -> bool {
-        INTERRUPTED.load(Ordering::Relaxed)
+        INTERRUPTED.load(Ordering::Relaxed) || is_out_of_time()
     }
 }
 

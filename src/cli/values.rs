@@ -2,6 +2,7 @@
 
 use std::ops::RangeInclusive;
 use std::str::FromStr;
+use std::time::Duration;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
@@ -127,6 +128,52 @@ pub fn bytes(text: &str) -> Result<u64, String> {
     let number: f64 = number.trim_end().parse().map_err(|_| expected())?;
     let bytes = number * (1u64 << shift) as f64;
     if (1.0..=9e18).contains(&bytes) { Ok(bytes as u64) } else { Err(expected()) }
+}
+
+/// Reads a span of time: numbers with units (`90s`, `1h30m`), seconds alone, or hours, minutes and seconds with colons.
+pub fn duration(text: &str) -> Result<Duration, String> {
+    let expected = || "expected a time, such as 90s, 45m, 1h30m or 1:30:00".to_owned();
+    let number = |digits: &str| digits.parse::<u64>().map_err(|_| expected());
+    let mut seconds = 0u64;
+    let mut add = |count: u64, unit: u64| {
+        seconds = count.checked_mul(unit).and_then(|more| seconds.checked_add(more)).ok_or_else(expected)?;
+        Ok::<(), String>(())
+    };
+    if text.contains(':') {
+        let parts: Vec<&str> = text.split(':').collect();
+        if parts.len() > 3 {
+            return Err(expected());
+        }
+        for (digits, unit) in parts.iter().rev().zip([1, 60, 3600]) {
+            add(number(digits)?, unit)?;
+        }
+    } else if text.ends_with(|last: char| last.is_ascii_digit()) {
+        add(number(text)?, 1)?;
+    } else {
+        for part in text.split_inclusive(|c: char| c.is_ascii_alphabetic()) {
+            let (digits, unit) = part.split_at(part.len() - 1);
+            let unit = match unit {
+                "s" => 1,
+                "m" => 60,
+                "h" => 3600,
+                "d" => 86_400,
+                _ => return Err(expected()),
+            };
+            add(number(digits)?, unit)?;
+        }
+    }
+    // Far more than any job, and far less than clocks hold.
+    if (1..=1 << 32).contains(&seconds) { Ok(Duration::from_secs(seconds)) } else { Err(expected()) }
+}
+
+/// Reads a range of frames, `A..B`, or one frame.
+pub fn frames(text: &str) -> Result<(i32, i32), String> {
+    const LAST: i32 = 1_000_000;
+    let (first, last) = text.split_once("..").unwrap_or((text, text));
+    match (first.trim().parse(), last.trim().parse()) {
+        (Ok(first), Ok(last)) if -LAST <= first && first <= last && last <= LAST => Ok((first, last)),
+        _ => Err("expected A..B, the first frame and the last, such as 1..250".into()),
+    }
 }
 
 /// Reads a whole number within a range.

@@ -360,7 +360,7 @@ impl Session {
     pub fn set_camera(&mut self, camera: Camera, movement: Option<u64>) -> Result<()> {
         let scene = &self.reading.scene;
         let named = |index: usize, named: &NamedCamera| {
-            if index == scene.active_camera { NamedCamera { camera, name: named.name.clone() } } else { named.clone() }
+            if index == scene.active_camera { NamedCamera { camera, ..named.clone() } } else { named.clone() }
         };
         let command = if self.document.count(Kind::Camera) == 0 {
             let cameras = scene.cameras.iter().enumerate().map(|(index, camera)| named(index, camera));

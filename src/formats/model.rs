@@ -219,7 +219,7 @@ mod tests {
             falloff: Falloff::None,
         };
         let contents = Contents {
-            cameras: vec![NamedCamera { name: "c".into(), camera }],
+            cameras: vec![NamedCamera::new("c", camera)],
             lights: vec![Light { name: "l".into(), kind, color: Rgb::ONE }],
             ..Default::default()
         };

@@ -20,6 +20,10 @@ pub mod hard_cases {}
 #[doc = include_str!("imports.md")]
 pub mod imports {}
 
+/// Renderings that outlive a process or a machine: resuming, parts, frames, and the engines that start them.
+#[doc = include_str!("jobs.md")]
+pub mod jobs {}
+
 /// How materials of model files become terms of the shading formula.
 #[doc = include_str!("materials.md")]
 pub mod materials {}

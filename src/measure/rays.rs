@@ -285,7 +285,7 @@ mod tests {
         let mut scene = scenes::empty();
         let projection = Projection::Perspective { fov_y: 1.0 };
         let camera = Camera::LookAt { eye: DVec3::Z * 9.0, target: DVec3::ZERO, up: DVec3::Y, projection };
-        scene.cameras = vec![NamedCamera { name: String::new(), camera }];
+        scene.cameras = vec![NamedCamera::new("", camera)];
         let cube = scenes::mesh_at(&points, triangles).unwrap();
         scenes::add_mesh(&mut scene, cube, DAffine3::from_translation(DVec3::new(4.0, 0.3, 0.0)), scenes::white());
         scenes::add_quadric(&mut scene, shapes::sphere(), DAffine3::IDENTITY, scenes::white());

@@ -31,9 +31,9 @@ use crate::render::answers::{Answers, Meeting, towards};
 use crate::render::ray_tracing::ray_tracing;
 use crate::render::shadow::Illumination;
 use crate::render::world::World;
-use crate::render::{BuildStats, Film, RenderSettings};
+use crate::render::{BuildStats, Film, RenderSettings, Tile};
 use crate::scene::camera::ViewRay;
-use crate::scene::{Scene, Shape};
+use crate::scene::{Camera, Scene, Shape};
 
 /// A scene that is rendered in f64 with exact hits.
 pub struct ReferenceRenderer {
@@ -73,13 +73,31 @@ impl ReferenceRenderer {
         &self.stats
     }
 
+    /// Puts another camera in the place of the active one.
+    pub fn look_through(&mut self, camera: Camera) {
+        self.scene.cameras[self.scene.active_camera].camera = camera;
+    }
+
     /// Renders the scene through its active camera, as [`Renderer::render`](crate::render::Renderer::render) does.
     ///
     /// # Errors
     /// A degenerate camera, or a crop outside the picture.
     pub fn render(&self, settings: &RenderSettings, progress: &dyn Progress) -> Result<Film> {
+        self.render_tiles(settings, progress, &|_| ())
+    }
+
+    /// [`render`](Self::render), with each tile shown to `finished` once it is, on the thread that rendered it.
+    ///
+    /// # Errors
+    /// As `render`.
+    pub fn render_tiles(
+        &self,
+        settings: &RenderSettings,
+        progress: &dyn Progress,
+        finished: &(dyn Fn(&Tile) + Sync),
+    ) -> Result<Film> {
         let Self { scene, world, oracle, .. } = self;
-        ray_tracing(scene, world, &Reference { scene, world, oracle }, settings, progress, &|_| ())
+        ray_tracing(scene, world, &Reference { scene, world, oracle }, settings, progress, finished)
     }
 }
 

@@ -9,39 +9,20 @@ use crate::error::{Error, Result};
 use crate::geometry::Hit;
 use crate::progress::Progress;
 use crate::render::answers::Answers;
-use crate::render::film::{Aov, AovKind, Film};
+use crate::render::film::{AovKind, Film};
 use crate::render::sampling::{Positions, position};
 use crate::render::settings::{Coverage, Crop, RayCounts, RenderSettings, RenderStats, ThreadSeconds};
 use crate::render::surface::SurfacePoint;
+use crate::render::tiles::{Tile, Tiles};
 use crate::render::trace::Tracer;
 use crate::render::wave::LARGEST;
 use crate::render::world::World;
 use crate::scene::camera::{CameraRays, ViewRay};
 use crate::scene::{Background, Rgb, Scene, Shape};
 
-/// Side of a tile in pixels: 32 x 32 pixels keep a thread busy for long enough and share well.
-const TILE: u32 = 32;
-
 /// Stack of a rendering thread: 16 KiB for each level of the deepest recursion,
 /// [`LARGEST_DEPTH`](crate::scene::film::LARGEST_DEPTH), which a test goes to.
 pub(super) const STACK: usize = 16 << 20;
-
-/// The most pixels that are rendered at once: 2^28, which take 6 GiB while tiles are put together.
-const LARGEST_PICTURE: u64 = 1 << 28;
-
-/// One tile's pixels, rows from the top.
-#[derive(Debug, Clone)]
-pub struct Tile {
-    /// Where it is in the picture.
-    pub area: Crop,
-    /// Linear colours.
-    pub color: Vec<[f32; 3]>,
-    /// How much of each pixel is covered; empty unless the background is transparent.
-    pub alpha: Vec<f32>,
-    aovs: Vec<Vec<f32>>,
-    counts: RayCounts,
-    seconds: ThreadSeconds,
-}
 
 /// Renders the scene through its active camera into a film.
 ///
@@ -61,19 +42,8 @@ pub fn ray_tracing<I: Answers>(
     finished: &(dyn Fn(&Tile) + Sync),
 ) -> Result<Film> {
     let film = &scene.film;
-    film.check()?;
+    let tiles = Tiles::of(film, settings.crop)?;
     let camera = scene.camera().rays(film.width, film.height, scene.origin)?;
-    let area = settings.crop.unwrap_or(Crop { x0: 0, y0: 0, x1: film.width, y1: film.height });
-    if !(area.x0 < area.x1 && area.y0 < area.y1 && area.x1 <= film.width && area.y1 <= film.height) {
-        return Err(Error::caller(format!(
-            "the crop {},{},{},{} does not lie within the {}x{} picture",
-            area.x0, area.y0, area.x1, area.y1, film.width, film.height
-        )));
-    }
-    if u64::from(area.x1 - area.x0) * u64::from(area.y1 - area.y0) > LARGEST_PICTURE {
-        return Err(Error::limit(format!("a picture of more than {LARGEST_PICTURE} pixels does not fit in memory"))
-            .remedy("render parts of it with a crop"));
-    }
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(settings.threads)
         .stack_size(STACK)
@@ -81,82 +51,51 @@ pub fn ray_tracing<I: Answers>(
         .map_err(|cause| Error::limit(format!("cannot start {} threads: {cause}", settings.threads)))?;
 
     let counter = settings.coverage.then(|| Counter::new(scene));
-    let tiles = tiles_of(area);
-    progress.begin("render", tiles.len() as u64);
+    let wanted: Vec<(u32, Crop)> = match &settings.tiles {
+        None => (0..tiles.count()).filter_map(|number| Some((number, tiles.tile(number)?))).collect(),
+        Some(numbers) => numbers.iter().filter_map(|&number| Some((number, tiles.tile(number)?))).collect(),
+    };
+    progress.begin("render", wanted.len() as u64);
     let start = std::time::Instant::now();
-    let render_tile = |&tile: &Crop| {
+    let render_tile = |&(number, area): &(u32, Crop)| {
         let tracer = Tracer::new(scene, world, intersect);
-        let tile = tile_pixels(&tracer, &camera, tile, &settings.aovs, counter.as_ref(), progress)?;
+        let tile = tile_pixels(&tracer, &camera, (number, area), &settings.aovs, counter.as_ref(), progress)?;
         finished(&tile);
         progress.advance(1);
         Some(tile)
     };
-    let finished: Vec<Option<Tile>> = pool.install(|| tiles.par_iter().map(render_tile).collect());
+    let finished: Vec<Option<Tile>> = pool.install(|| wanted.par_iter().map(render_tile).collect());
     let seconds = start.elapsed().as_secs_f64();
 
-    let (width, height) = (area.x1 - area.x0, area.y1 - area.y0);
-    let pixels = width as usize * height as usize;
     let transparent = scene.background == Background::Transparent;
-    let mut picture = Film {
-        width,
-        height,
-        crop: settings.crop,
-        color: vec![[0.0; 3]; pixels],
-        alpha: transparent.then(|| vec![0.0; pixels]),
-        aovs: settings
-            .aovs
-            .iter()
-            .map(|&kind| Aov { kind, channels: vec![vec![0.0; pixels]; kind.channels().len()] })
-            .collect(),
-        settings: *film,
-        complete: finished.iter().all(Option::is_some),
-        coverage: counter.map(Counter::finish),
-        stats: RenderStats { seconds, threads: pool.current_num_threads(), ..RenderStats::default() },
-    };
-    for tile in finished.into_iter().flatten() {
-        picture.stats.rays += tile.counts;
-        picture.stats.thread_seconds += tile.seconds;
-        copy_tile(&mut picture, area, &tile);
-    }
+    let mut picture = Film::blank(*film, settings.crop, &settings.aovs, transparent)?;
+    picture.complete = finished.iter().all(Option::is_some);
+    picture.coverage = counter.map(Counter::finish);
+    picture.stats = RenderStats { seconds, threads: pool.current_num_threads(), ..RenderStats::default() };
+    finished.into_iter().flatten().for_each(|tile| picture.put(&tile));
     let ThreadSeconds { traversal, shading, rest } = &mut picture.stats.thread_seconds;
     *rest = (seconds * picture.stats.threads as f64 - *traversal - *shading).max(0.0);
     Ok(picture)
-}
-
-/// The tiles of an area, row by row. They lie on the grid of the full picture, so that a crop traces the same tiles.
-fn tiles_of(area: Crop) -> Vec<Crop> {
-    let mut tiles = Vec::new();
-    let first = |start: u32| start / TILE * TILE;
-    for y in (first(area.y0)..area.y1).step_by(TILE as usize) {
-        for x in (first(area.x0)..area.x1).step_by(TILE as usize) {
-            tiles.push(Crop {
-                x0: x.max(area.x0),
-                y0: y.max(area.y0),
-                x1: x.saturating_add(TILE).min(area.x1),
-                y1: y.saturating_add(TILE).min(area.y1),
-            });
-        }
-    }
-    tiles
 }
 
 /// Renders one tile; `None` once the work is cancelled.
 fn tile_pixels<I: Answers>(
     tracer: &Tracer<'_, I>,
     camera: &CameraRays,
-    area: Crop,
+    (number, area): (u32, Crop),
     aovs: &[AovKind],
     counter: Option<&Counter>,
     progress: &dyn Progress,
 ) -> Option<Tile> {
-    let pixels = ((area.x1 - area.x0) * (area.y1 - area.y0)) as usize;
+    let pixels = (area.width() * area.height()) as usize;
     let channels = aovs.iter().map(|kind| kind.channels().len()).sum();
     let mut tile = Tile {
+        number,
         area,
         color: Vec::new(),
         alpha: Vec::new(),
         aovs: vec![vec![0.0; pixels]; channels],
-        counts: RayCounts::default(),
+        rays: RayCounts::default(),
         seconds: ThreadSeconds::default(),
     };
     let samples = tracer.scene.film.samples;
@@ -188,7 +127,7 @@ fn tile_pixels<I: Answers>(
             }
         });
     }
-    tile.counts = tracer.counts();
+    tile.rays = tracer.counts();
     tile.seconds = tracer.seconds();
     Some(tile)
 }
@@ -389,43 +328,6 @@ fn record<I: Answers>(
         };
         for (value, channel) in values.into_iter().zip(channels.by_ref().take(kind.channels().len())) {
             channel[at] = value;
-        }
-    }
-}
-
-fn copy_tile(picture: &mut Film, area: Crop, tile: &Tile) {
-    let tile_width = (tile.area.x1 - tile.area.x0) as usize;
-    for (row, y) in (tile.area.y0..tile.area.y1).enumerate() {
-        let from = row * tile_width..(row + 1) * tile_width;
-        let start = (y - area.y0) as usize * picture.width as usize + (tile.area.x0 - area.x0) as usize;
-        let to = start..start + tile_width;
-        picture.color[to.clone()].copy_from_slice(&tile.color[from.clone()]);
-        if let Some(alpha) = &mut picture.alpha {
-            alpha[to.clone()].copy_from_slice(&tile.alpha[from.clone()]);
-        }
-        let channels = picture.aovs.iter_mut().flat_map(|aov| &mut aov.channels);
-        for (channel, values) in channels.zip(&tile.aovs) {
-            channel[to.clone()].copy_from_slice(&values[from.clone()]);
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn tiles_cover_an_area_once() {
-        for area in [Crop { x0: 0, y0: 0, x1: 70, y1: 33 }, Crop { x0: 31, y0: 5, x1: 65, y1: 6 }] {
-            let mut seen = std::collections::HashSet::new();
-            for tile in tiles_of(area) {
-                for y in tile.y0..tile.y1 {
-                    for x in tile.x0..tile.x1 {
-                        assert!(seen.insert((x, y)));
-                    }
-                }
-            }
-            assert_eq!(seen.len() as u32, (area.x1 - area.x0) * (area.y1 - area.y0));
         }
     }
 }

@@ -9,10 +9,11 @@ use crate::progress::Progress;
 use crate::render::explain::{self, Explanation, Samples};
 use crate::render::film::Film;
 use crate::render::intersect::{Intersect, TwoLevel};
-use crate::render::ray_tracing::{Tile, ray_tracing};
+use crate::render::ray_tracing::ray_tracing;
 use crate::render::settings::RenderSettings;
+use crate::render::tiles::Tile;
 use crate::render::world::World;
-use crate::scene::Scene;
+use crate::scene::{Camera, Scene};
 
 /// A scene with its acceleration structures.
 pub struct Renderer {
@@ -130,6 +131,11 @@ impl Renderer {
     /// The scene.
     pub fn scene(&self) -> &Scene {
         &self.scene
+    }
+
+    /// Puts another camera in the place of the active one.
+    pub fn look_through(&mut self, camera: Camera) {
+        self.scene.cameras[self.scene.active_camera].camera = camera;
     }
 
     /// The objects as rays meet them.

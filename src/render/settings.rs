@@ -3,7 +3,7 @@
 use crate::render::film::AovKind;
 
 /// A part of the picture in pixels: origin top left, half-open.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Crop {
     /// First column.
     pub x0: u32,
@@ -15,6 +15,18 @@ pub struct Crop {
     pub y1: u32,
 }
 
+impl Crop {
+    /// Columns.
+    pub fn width(&self) -> u32 {
+        self.x1 - self.x0
+    }
+
+    /// Rows.
+    pub fn height(&self) -> u32 {
+        self.y1 - self.y0
+    }
+}
+
 /// What does not change a pixel's value, only which pixels are rendered and by whom.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct RenderSettings {
@@ -24,6 +36,8 @@ pub struct RenderSettings {
     pub crop: Option<Crop>,
     /// Extra values to record.
     pub aovs: Vec<AovKind>,
+    /// Render these of the picture's [`Tiles`](crate::render::tiles::Tiles) alone, by number; the others stay black.
+    pub tiles: Option<Vec<u32>>,
     /// Whether to count the pixels that show each material and each mesh.
     pub coverage: bool,
 }

@@ -111,7 +111,7 @@ fn add_missing(scene: &mut Scene, lights: bool) -> Automatic {
     let automatic = Automatic { camera, lights, room };
     if camera {
         let camera = automatic.default_camera(scene, DEFAULT_FOV.to_radians());
-        scene.cameras.push(NamedCamera { name: CAMERA_NAME.into(), camera });
+        scene.cameras.push(NamedCamera::new(CAMERA_NAME, camera));
     }
     if lights {
         automatic.light_from_camera(scene);

@@ -6,6 +6,7 @@ use crate::error::{Error, Result};
 use crate::math::lanes::{Flags, LANES, Vectors};
 use crate::math::simd::{Level, Task};
 use crate::math::vector::{cross, dot, is_safe, normalize};
+use crate::scene::camera_path::CameraPath;
 
 /// A camera with its name in the file.
 #[derive(Debug, Clone, PartialEq)]
@@ -14,6 +15,20 @@ pub struct NamedCamera {
     pub name: String,
     /// The camera.
     pub camera: Camera,
+    /// How it moves, where frames are rendered.
+    pub path: Option<CameraPath>,
+}
+
+impl NamedCamera {
+    /// One that does not move.
+    pub fn new(name: impl Into<String>, camera: Camera) -> Self {
+        Self { name: name.into(), camera, path: None }
+    }
+
+    /// The camera in a frame.
+    pub fn in_frame(&self, frame: i32) -> Camera {
+        self.path.as_ref().map_or(self.camera, |path| path.camera(&self.camera, frame))
+    }
 }
 
 /// A camera in the file's coordinates, f64.

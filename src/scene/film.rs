@@ -15,7 +15,7 @@ pub const LARGEST_DEPTH: u32 = 1000;
 pub const LARGEST_EXPOSURE: f32 = 126.0;
 
 /// When colours are clamped to 1.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Clamp {
     /// After every shade, so that a mirror never shows more than 1: the seed.
@@ -26,7 +26,7 @@ pub enum Clamp {
 }
 
 /// How linear values become the bytes of PNG and JPEG.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Transfer {
     /// The sRGB curve.
@@ -37,7 +37,7 @@ pub enum Transfer {
 }
 
 /// Everything about the picture that is not in the scene.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct FilmSettings {
     /// Width in pixels, from 1 to [`LONGEST_SIDE`].
     pub width: u32,

@@ -3,6 +3,7 @@
 pub mod auto;
 pub mod background;
 pub mod camera;
+pub mod camera_path;
 pub mod compiled;
 pub mod detail;
 pub mod exposure;
@@ -23,6 +24,7 @@ use std::sync::Arc;
 
 pub use background::Background;
 pub use camera::{Camera, NamedCamera, Projection};
+pub use camera_path::{CameraKey, CameraPath};
 pub use film::{Clamp, FilmSettings, Transfer};
 pub use light::{Falloff, Light, LightKind};
 pub use material::{Material, TextureRef};

@@ -57,7 +57,7 @@ fn picture(material: &Material) -> Result<Vec<[u8; 4]>> {
     });
     let scene = Scene {
         background: Background::Gradient { bottom: Rgb::splat(0.2), top: Rgb::new(0.5, 0.6, 0.8), up: DVec3::Y },
-        cameras: vec![NamedCamera { name: "ball".into(), camera }],
+        cameras: vec![NamedCamera::new("ball", camera)],
         film: FilmSettings { width: SIDE, height: SIDE, samples: 4, ..FilmSettings::default() },
         lights: vec![Light {
             name: String::new(),

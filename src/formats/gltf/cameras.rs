@@ -33,7 +33,7 @@ impl Cameras {
         };
         let name = source.name.clone().unwrap_or_else(|| format!("camera {}", index.value()));
         let name = self.unique(name);
-        self.list.push(NamedCamera { name, camera });
+        self.list.push(NamedCamera::new(name, camera));
     }
 
     /// All of them, in the order of their nodes.

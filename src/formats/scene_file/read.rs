@@ -197,7 +197,8 @@ impl Reader<'_> {
                 None if cameras.len() == 1 => "camera",
                 None => return Err(fields.error("a camera needs `name` where there are several")),
             };
-            self.scene.cameras.push(NamedCamera { name: name.to_owned(), camera });
+            let path = view::read_camera_path(fields, &camera)?;
+            self.scene.cameras.push(NamedCamera { name: name.to_owned(), camera, path });
         }
         Ok(())
     }

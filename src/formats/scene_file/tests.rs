@@ -13,8 +13,8 @@ use crate::progress::Silent;
 use crate::scene::film::{LARGEST_DEPTH, LARGEST_EXPOSURE, LONGEST_SIDE, MOST_SAMPLES};
 use crate::scene::texture::{Filter, Wrap};
 use crate::scene::{
-    Background, Camera, Clamp, Falloff, FilmSettings, Light, LightKind, NamedCamera, Projection, Rgb, Scene, Shape,
-    Transfer,
+    Background, Camera, CameraKey, CameraPath, Clamp, Falloff, FilmSettings, Light, LightKind, NamedCamera, Projection,
+    Rgb, Scene, Shape, Transfer,
 };
 
 fn parsed(text: &str) -> Result<Loaded> {
@@ -48,6 +48,30 @@ const MISTAKES: &[(&str, &str)] = &[
         "3:1: unknown key `normals` of an object; accepted are `sphere`, `name`, `material`, `transform`, `instances`, `visible`",
     ),
     ("[camera]\neye = [0, 0, 1]", "1:1: a camera needs `target`"),
+    (
+        "[camera]\neye = [0, 0, 1]\ntarget = [0, 0, 0]\nturntable = 5\npath = [{ frame = 1, eye = [0, 0, 2] }]",
+        "5:8: the camera moves in two ways; give `turntable` or `path`",
+    ),
+    (
+        "[camera]\neye = [0, 0, 1]\ntarget = [0, 0, 0]\npath = [{ frame = 2, eye = [0, 0, 2] }, { frame = 2, eye = [0, 0, 3] }]",
+        "4:51: the keys of a camera's path must be in the order of their frames",
+    ),
+    (
+        "[camera]\neye = [0, 0, 1]\ntarget = [0, 0, 0]\npath = [{ frame = 1.5, eye = [0, 0, 2] }]",
+        "4:19: `frame` must be a whole number",
+    ),
+    (
+        "[camera]\neye = [0, 0, 1]\ntarget = [0, 0, 0]\npath = [{ frame = 1, eye = [0, 0, 2], height = 3 }]",
+        "4:39: unknown key `height` of a key of the camera's path; accepted are `frame`, `eye`, `target`, `fov`",
+    ),
+    (
+        "[camera]\neye = [0, 0, 1]\ntarget = [0, 0, 0]\npath = []",
+        "4:8: the camera's path has no keys; give some, or leave `path` out",
+    ),
+    (
+        "[camera]\neye = [0, 0, 1]\ntarget = [0, 0, 0]\nturntable = 0",
+        "4:13: `turntable` must be a whole number from 1 to 1000000, not 0",
+    ),
     ("\n\n[[light]]\nposition = [0, 0, 0]", "3:1: a light needs `kind`"),
     ("[[material]]\ndiffuse = [1, 1, 1]", "1:1: a material needs `name`"),
     // TOML itself.
@@ -463,7 +487,10 @@ fn a_saved_scene_reads_back_to_the_bit() {
     let projection = Projection::Orthographic { height: 0.1 + 0.2 };
     let eye = DVec3::new(1.0 / 3.0, -1e-300, 1e300);
     let extra = Camera::LookAt { eye, target: DVec3::ZERO, up: DVec3::Y, projection };
-    scene.cameras.push(NamedCamera { name: "auto".into(), camera: extra });
+    let key = |frame: i32| CameraKey { frame, eye: eye * f64::from(frame), target: DVec3::ONE / 3.0, lens: 0.3 };
+    let path = Some(CameraPath::Keys(vec![key(-7), key(3)]));
+    scene.cameras.push(NamedCamera { name: "auto".into(), camera: extra, path });
+    scene.cameras.push(NamedCamera { path: Some(CameraPath::Turntable { frames: 9 }), ..scene.cameras[0].clone() });
     let angle = |degrees: f64| degrees.to_radians();
     let kind = LightKind::Spot {
         position: DVec3::ONE / 7.0,
@@ -483,7 +510,8 @@ fn a_saved_scene_reads_back_to_the_bit() {
     let read = formats::open(&to, &LoadOptions::default(), &Silent).unwrap().scene;
     assert_eq!(read.film, scene.film);
     assert_eq!((read.ambient, &read.background), (scene.ambient, &scene.background));
-    let cameras = |scene: &Scene| scene.cameras.iter().map(|named| named.camera).collect::<Vec<_>>();
+    let cameras =
+        |scene: &Scene| scene.cameras.iter().map(|named| (named.camera, named.path.clone())).collect::<Vec<_>>();
     assert_eq!(cameras(&read), cameras(&scene));
     let lights = |scene: &Scene| scene.lights.iter().map(|light| (light.kind, light.color)).collect::<Vec<_>>();
     assert_eq!(lights(&read), lights(&scene));

@@ -7,10 +7,13 @@ use crate::formats::scene_file::read::Reader;
 use crate::formats::scene_file::value::{Fields, Value};
 use crate::math::vector::normalize;
 use crate::scene::film::{LARGEST_DEPTH, LARGEST_EXPOSURE, LONGEST_SIDE, MOST_SAMPLES};
-use crate::scene::{Background, Camera, Clamp, FilmSettings, Projection, Transfer};
+use crate::scene::{Background, Camera, CameraKey, CameraPath, Clamp, FilmSettings, Projection, Transfer};
 
 /// Vertical field of view where a perspective camera gives none, degrees.
 const DEFAULT_FOV: f64 = 40.0;
+
+/// The last frame that there can be, and with a minus the first.
+const LAST_FRAME: u32 = 1_000_000;
 
 #[derive(Clone, Copy)]
 enum CameraKind {
@@ -35,11 +38,8 @@ pub fn read_camera(fields: &Fields<'_>) -> Result<Camera> {
     let up = |fields: &Fields<'_>| fields.or("up", DVec3::Y, Value::direction);
     let camera = match kind {
         CameraKind::Perspective => {
-            fields.accept(&["name", "kind", "eye", "target", "up", "fov"])?;
-            let fov = fields.or("fov", DEFAULT_FOV, |value| {
-                let degrees = value.positive()?;
-                if degrees < 180.0 { Ok(degrees) } else { Err(value.error("`fov` must be less than 180 degrees")) }
-            })?;
+            fields.accept(&["name", "kind", "eye", "target", "up", "fov", "turntable", "path"])?;
+            let fov = fields.or("fov", DEFAULT_FOV, field_of_view)?;
             Camera::LookAt {
                 eye: fields.require("eye")?.vector()?,
                 target: fields.require("target")?.vector()?,
@@ -48,7 +48,7 @@ pub fn read_camera(fields: &Fields<'_>) -> Result<Camera> {
             }
         }
         CameraKind::Orthographic => {
-            fields.accept(&["name", "kind", "eye", "target", "up", "height"])?;
+            fields.accept(&["name", "kind", "eye", "target", "up", "height", "turntable", "path"])?;
             Camera::LookAt {
                 eye: fields.require("eye")?.vector()?,
                 target: fields.require("target")?.vector()?,
@@ -68,6 +68,50 @@ pub fn read_camera(fields: &Fields<'_>) -> Result<Camera> {
     };
     camera.rays(2, 2, DVec3::ZERO).map_err(|error| fields.error(error.message()))?;
     Ok(camera)
+}
+
+/// Degrees, between 0 and 180.
+fn field_of_view(value: &Value<'_>) -> Result<f64> {
+    let degrees = value.positive()?;
+    if degrees < 180.0 { Ok(degrees) } else { Err(value.error("`fov` must be less than 180 degrees")) }
+}
+
+/// How a camera moves, if it does: `turntable`, or the keys of `path`.
+pub fn read_camera_path(fields: &Fields<'_>, camera: &Camera) -> Result<Option<CameraPath>> {
+    let Camera::LookAt { target, projection, .. } = *camera else { return Ok(None) };
+    if let Some(turntable) = fields.get("turntable") {
+        if let Some(path) = fields.get("path") {
+            return Err(path.error("the camera moves in two ways").remedy("give `turntable` or `path`"));
+        }
+        return Ok(Some(CameraPath::Turntable { frames: turntable.whole(1..=LAST_FRAME)? }));
+    }
+    let Some(path) = fields.get("path") else { return Ok(None) };
+    let mut keys: Vec<CameraKey> = Vec::new();
+    for key in path.tables("a key of the camera's path")? {
+        let (lens_name, lens) = match projection {
+            Projection::Perspective { fov_y } => ("fov", fov_y),
+            Projection::Orthographic { height } => ("height", height),
+        };
+        key.accept(&["frame", "eye", "target", lens_name])?;
+        let number = key.require("frame")?;
+        let frame = number.between(-f64::from(LAST_FRAME)..=f64::from(LAST_FRAME))?;
+        if frame.fract() != 0.0 {
+            return Err(number.error("`frame` must be a whole number"));
+        }
+        if keys.last().is_some_and(|last| f64::from(last.frame) >= frame) {
+            return Err(number.error("the keys of a camera's path must be in the order of their frames"));
+        }
+        let lens = key.or(lens_name, lens, |value| match projection {
+            Projection::Perspective { .. } => Ok(field_of_view(value)?.to_radians()),
+            Projection::Orthographic { .. } => value.positive(),
+        })?;
+        let (eye, target) = (key.require("eye")?.vector()?, key.or("target", target, Value::vector)?);
+        keys.push(CameraKey { frame: frame as i32, eye, target, lens });
+    }
+    if keys.is_empty() {
+        return Err(path.error("the camera's path has no keys").remedy("give some, or leave `path` out"));
+    }
+    Ok(Some(CameraPath::Keys(keys)))
 }
 
 /// What the film is where the file does not say: the seed's for the seed's camera.

@@ -9,7 +9,8 @@ use crate::error::{Error, Result};
 use crate::formats::atomic_file::{relative_to, write_atomically};
 use crate::formats::{self, LoadOptions, NormalMode, UpAxis};
 use crate::scene::{
-    Background, Camera, Clamp, Falloff, FilmSettings, Light, LightKind, NamedCamera, Projection, Rgb, Scene, Transfer,
+    Background, Camera, CameraKey, CameraPath, Clamp, Falloff, FilmSettings, Light, LightKind, NamedCamera, Projection,
+    Rgb, Scene, Transfer,
 };
 
 /// Writes a scene that was opened from the bare model file `model` as the scene file `to`, in one piece.
@@ -171,6 +172,23 @@ fn write_camera(out: &mut Text, named: &NamedCamera, names: &mut Names) {
             out.key("lower_left", vector(lower_left));
             out.key("lower_right", vector(lower_right));
             out.key("upper_left", vector(upper_left));
+        }
+    }
+    match &named.path {
+        None => {}
+        Some(CameraPath::Turntable { frames }) => out.key("turntable", frames),
+        Some(CameraPath::Keys(keys)) => {
+            let key = |key: &CameraKey| {
+                let lens = match named.camera {
+                    Camera::LookAt { projection: Projection::Perspective { .. }, .. } => {
+                        format!("fov = {}", number(degrees(key.lens)))
+                    }
+                    _ => format!("height = {}", number(key.lens)),
+                };
+                let (frame, eye, target) = (key.frame, vector(key.eye), vector(key.target));
+                format!("{{ frame = {frame}, eye = {eye}, target = {target}, {lens} }}")
+            };
+            out.key("path", format_args!("[{}]", keys.iter().map(key).collect::<Vec<_>>().join(", ")));
         }
     }
 }

@@ -141,7 +141,7 @@ fn same_bytes(context: &Context<'_>) -> Result<Outcome> {
 fn look_at(scene: &mut Scene, width: u32) {
     let (eye, target) = (DVec3::new(2.0, 1.5, 5.0), DVec3::ZERO);
     let camera = Camera::LookAt { eye, target, up: DVec3::Y, projection: Projection::Perspective { fov_y: 0.8 } };
-    scene.cameras = vec![NamedCamera { name: "case".into(), camera }];
+    scene.cameras = vec![NamedCamera::new("case", camera)];
     scene.background = Background::Gradient { bottom: Rgb::ZERO, top: Rgb::ONE, up: DVec3::Y };
     for (position, color) in [(DVec3::new(3.0, 5.0, 4.0), Rgb::ONE), (DVec3::new(-4.0, 2.0, 1.0), Rgb::splat(0.5))] {
         let kind = LightKind::Point { position, falloff: Falloff::None };

@@ -170,7 +170,7 @@ fn series(
         up: DVec3::Z,
         projection: Projection::Perspective { fov_y: 0.01 },
     };
-    scene.cameras = vec![NamedCamera { name: "between".into(), camera }];
+    scene.cameras = vec![NamedCamera::new("between", camera)];
     let renderer = Renderer::build(scene, params, context.progress)?;
     let film = renderer.render(&RenderSettings { threads: 1, ..RenderSettings::default() }, context.progress)?;
     context.progress.check()?;

@@ -169,7 +169,7 @@ fn moved_camera(named: &NamedCamera, moved: impl Fn(DVec3) -> DVec3, unit: f64) 
             upper_left: moved(upper_left),
         },
     };
-    NamedCamera { name: named.name.clone(), camera }
+    NamedCamera { camera, ..named.clone() }
 }
 
 #[cfg(test)]
