@@ -517,6 +517,7 @@ fn info_is_readable_and_its_json_is_stable() {
         "ledger",
         "doctor",
         "tree",
+        "estimate",
     ];
     assert_documented(&json, &expected);
     let json: Value = serde_json::from_slice(&workshop.succeed("info model.obj --json --validate")).unwrap();
@@ -720,12 +721,52 @@ fn a_limit_of_memory_chooses_the_compact_structure_or_refuses() {
             .unwrap();
     assert_eq!(info["tree"]["accelerator"], "compact");
     assert!(info["tree"]["bytes_per_triangle"].as_f64().unwrap() < 24.0);
-    let refused = workshop.fail("render hills.obj --memory-limit 1M");
-    assert!(refused.contains("MiB") && refused.contains("raise the limit"), "{refused}");
+    // Before it is read: its last line is wrong.
+    workshop.write("flawed.obj", &format!("{hills}f 1 2\n"));
+    for flags in ["hills.obj", "flawed.obj", "hills.obj --turntable 3"] {
+        let refused = workshop.fail(&format!("render {flags} --memory-limit 1M"));
+        assert!(refused.contains("MiB") && refused.contains("raise the limit"), "{refused}");
+        assert!(refused.contains("--accelerator compact"), "{refused}");
+    }
     let exact = workshop.fail("render hills.obj --memory-limit 2G --precision f64");
     assert!(exact.contains("--precision f64"), "{exact}");
     let both = workshop.run("render hills.obj --memory-limit 1M --accelerator wide");
     assert_eq!(both.status.code(), Some(2), "{}", text(&both.stderr));
+}
+
+#[test]
+fn estimates_are_near_what_rendering_takes() {
+    let workshop = Workshop::new();
+    let info = |flags: &str| -> Value {
+        let text = workshop.succeed(&format!("info model.obj --json --estimate --size 320x200 {flags}"));
+        serde_json::from_slice(&text).unwrap()
+    };
+    let json = info("--spp 20 --machines 3 --cores 1");
+    let estimate = &json["estimate"];
+    let keys =
+        ["peak_bytes", "measured", "load", "build", "render", "write", "seconds", "tiles", "tried", "tried_samples"];
+    let keys = keys.into_iter().chain(["threads", "shared", "worthwhile"]);
+    assert!(keys.clone().all(|key| !estimate[key].is_null()), "{estimate}");
+    let page = &MANUAL[MANUAL.find("### `info --json`").unwrap()..];
+    assert!(keys.into_iter().all(|key| page.contains(&format!("\"{key}\""))));
+    assert_eq!((estimate["tiles"].as_u64(), estimate["tried_samples"].as_u64()), (Some(70), Some(4)));
+    assert_eq!(json["tree"]["accelerator"], "wide");
+    let text = text(&workshop.succeed("info model.obj --estimate --size 320x200 --spp 20 --machines 3"));
+    assert!(
+        ["memory at most", "rendering", "the longest part", "worthwhile"].iter().all(|row| text.contains(row)),
+        "{text}"
+    );
+
+    // Other tests run beside this one: what is told must be of the size of what is.
+    workshop.succeed("render model.obj --size 320x200 --spp 20 -o a.png --stats-json stats.json");
+    let stats: Value = serde_json::from_slice(&fs::read(workshop.path("stats.json")).unwrap()).unwrap();
+    let ratio = estimate["render"].as_f64().unwrap() / stats["seconds"]["render"].as_f64().unwrap();
+    assert!((0.2..5.0).contains(&ratio), "{ratio}");
+    if let Some(peak) = stats["bytes"]["peak_resident"].as_f64() {
+        let ratio = estimate["peak_bytes"].as_f64().unwrap() / peak;
+        assert!((0.8..1.25).contains(&ratio), "{ratio}");
+    }
+    assert_eq!(workshop.run("info model.obj --machines 3").status.code(), Some(2));
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! What can be said on the command line: one entry a flag, which feeds the parser, the help and the completions.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, Parser, Subcommand, ValueHint};
 use clap_complete::Shell;
@@ -9,9 +9,10 @@ use super::bench::BenchArguments;
 use super::check::CheckArguments;
 use super::diff::DiffArguments;
 use super::edit::EditArguments;
+use super::estimate::EstimateArguments;
 use super::explain::ExplainArguments;
 use super::job::{JobArguments, MergeArguments};
-use super::memory_limit::kind_within;
+use super::memory_limit::{kind_that_fits, kind_within, refuse_what_does_not_fit};
 use super::precision::Precision;
 use super::query::QueryArguments;
 use super::report::ReportArguments;
@@ -250,6 +251,9 @@ pub struct InfoArguments {
     /// How trees are built.
     #[command(flatten)]
     pub build: BuildArguments,
+    /// What rendering will take.
+    #[command(flatten)]
+    pub estimate: EstimateArguments,
 }
 
 fn aovs() -> impl Iterator<Item = (&'static str, AovKind)> {
@@ -330,6 +334,7 @@ impl BuildArguments {
     pub fn params(&self, scene: &Scene, picture: u64) -> Result<Params> {
         let kind = match self.memory_limit {
             Some(limit) => kind_within(limit, scene, picture)?,
+            None if self.accelerator == Kind::Auto => kind_that_fits(scene, picture)?,
             None => self.accelerator,
         };
         Ok(Params { kind, preset: self.preset })
@@ -337,6 +342,14 @@ impl BuildArguments {
 }
 
 impl BuildArguments {
+    /// Refuses a scene that does not fit in memory before it is read, as far as its files tell.
+    ///
+    /// # Errors
+    /// How much is needed and what helps.
+    pub fn refuse_what_does_not_fit(&self, input: &Path, options: &LoadOptions) -> Result<()> {
+        refuse_what_does_not_fit(input, options, self.accelerator, self.memory_limit)
+    }
+
     /// Says that nothing keeps a limit of memory with a flag that leaves no choice of structures.
     pub fn refuse_limit(&self, flag: &str) -> Result<()> {
         match self.memory_limit {

@@ -6,11 +6,14 @@ use std::path::Path;
 use glam::DVec3;
 use serde::Serialize;
 
-use super::arguments::InfoArguments;
+use super::arguments::{CameraArguments, InfoArguments};
+use super::camera;
 use super::doctor::Diagnosis;
+use super::estimate::Estimate;
 use super::info_text;
 use super::ledger::{self, Told};
-use super::stats_json::{SCHEMA, lossy, lossy_list};
+use super::memory_limit::needed_bytes;
+use super::stats_json::{SCHEMA, lossy, lossy_list, timed};
 use super::terminal::{self, Terminal};
 use crate::error::{Error, Result};
 use crate::formats::ledger::Entry;
@@ -58,8 +61,10 @@ pub struct Info<'a> {
     pub ledger: Vec<LedgerEntry>,
     /// What is wrong with the meshes; null unless `--validate` was given.
     pub doctor: Option<Diagnosis>,
-    /// Null unless `--tree` or `--validate` was given.
+    /// Null unless `--tree`, `--validate` or `--estimate` was given.
     pub tree: Option<Tree>,
+    /// What rendering will take; null unless `--estimate` was given.
+    pub estimate: Option<Estimate>,
 }
 
 /// Numbers of triangles.
@@ -171,18 +176,36 @@ pub fn run(arguments: &InfoArguments) -> Result<()> {
     super::use_threads(arguments.build.threads)?;
     // Places are told by the faces of the file.
     let options = LoadOptions { faces: arguments.validate, ..arguments.load.options() };
-    let loaded = formats::open(&arguments.input, &options, &terminal);
+    if arguments.tree || arguments.validate || arguments.estimate.estimate {
+        arguments.build.refuse_what_does_not_fit(&arguments.input, &options)?;
+    }
+    let (loaded, load) = timed(|| formats::open(&arguments.input, &options, &terminal));
     terminal.clear();
-    let Loaded { scene, ledger, .. } = loaded?;
+    let Loaded { mut scene, ledger, automatic } = loaded?;
+    if arguments.estimate.values.size.is_some() {
+        arguments.estimate.values.apply(&mut scene.film);
+        camera::choose(&mut scene, automatic, &CameraArguments::default(), true)?;
+    } else {
+        arguments.estimate.values.apply(&mut scene.film);
+    }
     ledger::report(&arguments.input, &ledger, &scene, Told::Warnings, arguments.load.strict)?;
     let mut info = Info::of(&arguments.input, &scene, &ledger);
     if arguments.validate {
         info.doctor = Some(Diagnosis::of(&scene, info.bounds.as_ref()));
     }
-    if arguments.tree || arguments.validate {
-        let renderer = arguments.build.params(&scene, 0).and_then(|params| Renderer::build(scene, &params, &terminal));
+    if arguments.tree || arguments.validate || arguments.estimate.estimate {
+        let params = arguments.build.params(&scene, 0)?;
+        let needed = needed_bytes(&scene, params.kind);
+        let renderer = Renderer::build(scene, &params, &terminal);
         terminal.clear();
-        info.tree = Some(Tree::of(&renderer?, arguments)?);
+        let mut renderer = renderer?;
+        info.tree = Some(Tree::of(&renderer, arguments)?);
+        if arguments.estimate.estimate {
+            let threads = arguments.build.threads as usize;
+            let estimate = Estimate::of(&mut renderer, load, needed, &arguments.estimate, threads, &terminal);
+            terminal.clear();
+            info.estimate = Some(estimate?);
+        }
     }
     let text = if arguments.json {
         serde_json::to_string_pretty(&info).expect("names and numbers have a JSON form") + "\n"
@@ -240,6 +263,7 @@ impl<'a> Info<'a> {
             ledger: ledger.all().map(entry).collect(),
             doctor: None,
             tree: None,
+            estimate: None,
         }
     }
 }

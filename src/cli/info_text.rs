@@ -3,9 +3,11 @@
 use std::collections::BTreeMap;
 
 use super::doctor::Diagnosis;
+use super::estimate::Estimate;
 use super::info::{Info, PerTriangle, Tree};
 use super::ledger;
 use super::terminal::printable;
+use crate::job::estimate::Shared;
 
 /// Width of the column of names.
 const LABEL: usize = 22;
@@ -23,6 +25,9 @@ pub fn of(info: &Info<'_>) -> String {
     memory(&mut table, info);
     if let Some(tree) = &info.tree {
         tree_rows(&mut table, tree);
+    }
+    if let Some(estimate) = &info.estimate {
+        estimate_rows(&mut table, estimate);
     }
     if let Some(doctor) = &info.doctor {
         doctor_rows(&mut table, doctor);
@@ -119,6 +124,25 @@ fn memory(table: &mut Table, info: &Info<'_>) {
         if bytes > 0 {
             table.bytes(part, bytes, share);
         }
+    }
+}
+
+fn estimate_rows(table: &mut Table, estimate: &Estimate) {
+    table.heading("estimate");
+    let Estimate { load, build, render, write, seconds, tiles, tried, tried_samples, threads, .. } = estimate;
+    let told = if estimate.measured { "" } else { ", by what arrays take" };
+    table.row("memory at most", format!("{}{told}", readable(estimate.peak_bytes)));
+    table.row("time", format!("{seconds:.1} s on {threads} threads"));
+    table.row("  reading", format!("{load:.2} s, as it took"));
+    table.row("  building", format!("{build:.2} s, as it took"));
+    table.row("  rendering", format!("{render:.2} s, by {tried} of {tiles} tiles at {tried_samples} samples a pixel"));
+    table.row("  writing", format!("{write:.2} s"));
+    if let (Some(shared), Some(worthwhile)) = (&estimate.shared, estimate.worthwhile) {
+        let Shared { machines, cores, seconds, longest, imbalance } = shared;
+        table.row("machines", format!("{machines} with {cores} processors each: {seconds:.1} s"));
+        table.row("  the longest part", format!("{longest:.2} s of rendering, {imbalance:.3} of the mean"));
+        let saving = "from there on twice as many save less than a twentieth";
+        table.row("  worthwhile", format!("{worthwhile}: {saving}"));
     }
 }
 

@@ -1,9 +1,14 @@
-//! `--memory-limit`: which structure a scene can afford.
+//! Which structure a scene can afford, by `--memory-limit` or what the machine has to spare; and whether it can be rendered at all,
+//! found out before it is read.
+
+use std::path::Path;
 
 use super::info_text::readable;
-use super::stats_json::{geometry_bytes, texture_bytes};
+use super::stats_json::{geometry_bytes, parse_kibibytes, resident_bytes, texture_bytes};
+use super::terminal;
 use crate::accel::Kind;
 use crate::error::{Error, Result};
+use crate::formats::{LoadOptions, Outline};
 use crate::render::world::Instance;
 use crate::render::{AovKind, Crop};
 use crate::scene::{FilmSettings, Object, Scene};
@@ -15,6 +20,99 @@ pub fn picture_bytes(film: &FilmSettings, crop: Option<Crop>, aovs: &[AovKind]) 
     (2 * 4 * values + 8) * u64::from(width) * u64::from(height)
 }
 
+/// Bytes that this process may take besides what it has: the system's word, and that of the group of processes (a container, a batch
+/// job) that it belongs to. `None` where nobody says.
+pub fn available_bytes() -> Option<u64> {
+    let read = |path: &str| std::fs::read_to_string(path).unwrap_or_default();
+    let of_system = parse_kibibytes(&read("/proc/meminfo"), "MemAvailable:");
+    let own_group = read("/proc/self/cgroup");
+    let group = own_group.lines().find_map(|line| line.strip_prefix("0::")).unwrap_or("/");
+    let folder = format!("/sys/fs/cgroup{}", group.trim_end_matches('/'));
+    let most = read(&format!("{folder}/memory.max")).trim().parse::<u64>().ok();
+    // What files are kept in memory for speed gives way.
+    let taken =
+        read(&format!("{folder}/memory.stat")).lines().find_map(|line| line.strip_prefix("anon ")?.parse().ok());
+    let of_group = most.map(|most| most.saturating_sub(taken.unwrap_or(0)));
+    of_system.into_iter().chain(of_group).min()
+}
+
+/// Refuses a scene whose triangles alone take more while structures are built than `limit`, or else than the machine has to spare, before
+/// it is read.
+///
+/// # Errors
+/// Says how much is needed and what helps. What is wrong with the files is not told here.
+pub fn refuse_what_does_not_fit(input: &Path, options: &LoadOptions, kind: Kind, limit: Option<u64>) -> Result<()> {
+    let Ok(outline) = Outline::of(input, options) else { return Ok(()) };
+    let Some(room) = limit.or_else(available_bytes) else { return Ok(()) };
+    let needed = |kind: Kind| {
+        let triangles = outline.triangles.iter().copied();
+        outline.geometry_bytes.saturating_add(kind.peak_bytes(triangles, rayon::current_num_threads()))
+    };
+    // Where there is a choice, the compact one is what can be had.
+    let least = if kind == Kind::Auto { Kind::Compact } else { kind };
+    if !matches!(least, Kind::Wide | Kind::Compact) || needed(least) <= room {
+        return Ok(());
+    }
+    let triangles: usize = outline.triangles.iter().sum();
+    let (wide, compact) = (readable(needed(Kind::Wide)), readable(needed(Kind::Compact)));
+    let whose = if limit.is_some() { "--memory-limit allows" } else { "this machine has to spare" };
+    let error = Error::limit(format!(
+        "rendering about {triangles} triangles takes {wide}, or {compact} with --accelerator compact, and {whose} {}",
+        readable(room)
+    ));
+    Err(error.at_path(input).remedy(match (limit, least) {
+        (_, Kind::Wide) => "leave out --accelerator wide, take a smaller model, or raise --memory-limit".to_owned(),
+        (Some(_), _) => "raise the limit, or take a smaller model".to_owned(),
+        (None, _) => {
+            format!(
+                "take a smaller model or a larger machine, or insist with --memory-limit {}G",
+                (needed(least) >> 30) + 1
+            )
+        }
+    }))
+}
+
+/// The fastest structure that fits what the machine has to spare; if the fast one does not, that is told.
+///
+/// # Errors
+/// When the most compact one takes more.
+pub fn kind_that_fits(scene: &Scene, picture: u64) -> Result<Kind> {
+    let Some((spare, own)) = available_bytes().zip(resident_bytes()) else { return Ok(Kind::Auto) };
+    let needed = |kind: Kind| needed_bytes(scene, kind) + picture;
+    let room = spare + own;
+    if needed(Kind::Wide) <= room {
+        return Ok(Kind::Auto);
+    }
+    let (wide, compact) = (readable(needed(Kind::Wide)), readable(needed(Kind::Compact)));
+    if needed(Kind::Compact) <= room {
+        terminal::report(&format!(
+            "note: the compact structure is built, in {compact}: the fastest takes {wide}, and there are {} to spare",
+            readable(room)
+        ));
+        return Ok(Kind::Compact);
+    }
+    Err(Error::limit(format!(
+        "the scene takes about {compact} with the most compact structure, and this machine has {} to spare",
+        readable(room)
+    ))
+    .remedy(format!(
+        "take a smaller model or picture, or insist with --memory-limit {}G",
+        (needed(Kind::Compact) >> 30) + 1
+    )))
+}
+
+/// Bytes of a scene without its structures.
+fn other_bytes(scene: &Scene) -> u64 {
+    let instances = (scene.objects.len() * (size_of::<Object>() + size_of::<Instance>())) as u64;
+    geometry_bytes(scene) + texture_bytes(scene) + instances
+}
+
+/// The most bytes that a scene and its structures take while these are built; about, and rather too many.
+pub fn needed_bytes(scene: &Scene, kind: Kind) -> u64 {
+    let triangles = scene.meshes.iter().map(|mesh| mesh.live_count());
+    other_bytes(scene) + kind.resolve().peak_bytes(triangles, rayon::current_num_threads())
+}
+
 /// The fastest structure with which a scene that is loaded, its structures being built, and a picture of so many bytes take at
 /// most so many.
 ///
@@ -23,8 +121,7 @@ pub fn picture_bytes(film: &FilmSettings, crop: Option<Crop>, aovs: &[AovKind]) 
 pub fn kind_within(limit: u64, scene: &Scene, picture: u64) -> Result<Kind> {
     let triangles: Vec<usize> = scene.meshes.iter().map(|mesh| mesh.live_count()).collect();
     let threads = rayon::current_num_threads();
-    let instances = (scene.objects.len() * (size_of::<Object>() + size_of::<Instance>())) as u64;
-    let others = geometry_bytes(scene) + texture_bytes(scene) + instances + picture;
+    let others = other_bytes(scene) + picture;
     let room = limit.checked_sub(others);
     room.and_then(|room| Kind::within(room, &triangles, threads)).ok_or_else(|| {
         let needed = readable(others + Kind::Compact.peak_bytes(triangles, threads));

@@ -14,6 +14,7 @@ mod completions;
 mod diff;
 mod doctor;
 mod edit;
+mod estimate;
 mod explain;
 mod explain_text;
 mod info;

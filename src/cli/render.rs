@@ -46,6 +46,9 @@ pub fn run(arguments: &RenderArguments) -> Result<()> {
     let mut seconds = Seconds::default();
 
     let options = arguments.load.options();
+    if arguments.precision == Precision::F32 {
+        arguments.build.refuse_what_does_not_fit(&arguments.input, &options)?;
+    }
     let loaded;
     (loaded, seconds.load) = timed(|| formats::open(&arguments.input, &options, &terminal));
     terminal.clear();

@@ -157,13 +157,18 @@ fn film_bytes(film: &Film) -> u64 {
 }
 
 /// The most memory that this process ever had resident; `None` where the system has no `/proc/self/status`.
-fn peak_resident_bytes() -> Option<u64> {
-    parse_peak(&std::fs::read_to_string("/proc/self/status").ok()?)
+pub fn peak_resident_bytes() -> Option<u64> {
+    parse_kibibytes(&std::fs::read_to_string("/proc/self/status").ok()?, "VmHWM:")
 }
 
-/// Reads the line `VmHWM: N kB`, whose kB are 1024 bytes.
-fn parse_peak(status: &str) -> Option<u64> {
-    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+/// The memory that this process has resident now; `None` where the system does not say.
+pub fn resident_bytes() -> Option<u64> {
+    parse_kibibytes(&std::fs::read_to_string("/proc/self/status").ok()?, "VmRSS:")
+}
+
+/// Reads a line such as `VmHWM: N kB`, whose kB are 1024 bytes.
+pub fn parse_kibibytes(text: &str, name: &str) -> Option<u64> {
+    let line = text.lines().find_map(|line| line.strip_prefix(name))?;
     line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()?.checked_mul(1024)
 }
 
@@ -174,9 +179,11 @@ mod tests {
 
     #[test]
     fn the_peak_is_read_in_bytes() {
-        assert_eq!(parse_peak("Name:\tx\nVmHWM:\t    1234 kB\nVmRSS:\t 9 kB\n"), Some(1_263_616));
-        assert_eq!(parse_peak("Name:\tx\n"), None);
-        assert_eq!(parse_peak("VmHWM:\tmuch\n"), None);
+        let status = "Name:\tx\nVmHWM:\t    1234 kB\nVmRSS:\t 9 kB\n";
+        assert_eq!(parse_kibibytes(status, "VmHWM:"), Some(1_263_616));
+        assert_eq!(parse_kibibytes(status, "VmRSS:"), Some(9216));
+        assert_eq!(parse_kibibytes("Name:\tx\n", "VmHWM:"), None);
+        assert_eq!(parse_kibibytes("VmHWM:\tmuch\n", "VmHWM:"), None);
     }
 
     #[test]

@@ -7,6 +7,7 @@ pub mod ledger;
 pub mod limits;
 pub mod model;
 pub mod obj;
+pub mod outline;
 pub mod picture;
 pub mod reach;
 mod rounding;
@@ -26,6 +27,7 @@ use crate::scene::{Camera, LightKind, Projection, Scene, exposure, origin};
 pub use ledger::{Ledger, Scope, Treatment};
 pub use limits::Limits;
 pub use model::Model;
+pub use outline::Outline;
 
 /// Which shading normals a mesh gets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Serialize)]

@@ -62,8 +62,8 @@ fn terrain(side: u32) -> TriangleMesh {
     TriangleMesh { positions: positions.collect(), indices: indices.collect(), ..TriangleMesh::default() }
 }
 
-/// Ten octaves of value noise, each half as high and twice as fine as the one before.
-fn height(x: f64, z: f64) -> f64 {
+/// The terrain's height: ten octaves of value noise, each half as high and twice as fine as the one before.
+pub fn height(x: f64, z: f64) -> f64 {
     let (mut sum, mut amplitude, mut frequency) = (0.0, 0.25, 2.0);
     for octave in 0..10 {
         sum += amplitude * noise(x * frequency, z * frequency, octave);

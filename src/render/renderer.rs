@@ -13,7 +13,7 @@ use crate::render::ray_tracing::ray_tracing;
 use crate::render::settings::RenderSettings;
 use crate::render::tiles::Tile;
 use crate::render::world::World;
-use crate::scene::{Camera, Scene};
+use crate::scene::{Camera, FilmSettings, Scene};
 
 /// A scene with its acceleration structures.
 pub struct Renderer {
@@ -131,6 +131,11 @@ impl Renderer {
     /// The scene.
     pub fn scene(&self) -> &Scene {
         &self.scene
+    }
+
+    /// Renders other pictures from now on.
+    pub fn set_film(&mut self, film: FilmSettings) {
+        self.scene.film = film;
     }
 
     /// Puts another camera in the place of the active one.

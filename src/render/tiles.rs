@@ -93,14 +93,18 @@ impl Tiles {
     /// Along a curve that stays among neighbours (Morton 1966) each tile goes to the next share, so that all shares look
     /// at all of the picture.
     pub fn share(&self, share: u32, shares: u32) -> Vec<u32> {
-        let [_, _, columns, _] = self.grid();
-        let mut order: Vec<(u64, u32)> =
-            (0..self.count()).map(|number| (morton(number % columns, number / columns), number)).collect();
-        order.sort_unstable();
-        let own = order.into_iter().skip(share as usize).step_by(shares.max(1) as usize);
-        let mut own: Vec<u32> = own.map(|(_, number)| number).collect();
+        let own = self.along_curve().into_iter().skip(share as usize).step_by(shares.max(1) as usize);
+        let mut own: Vec<u32> = own.collect();
         own.sort_unstable();
         own
+    }
+
+    /// The numbers of all tiles along the curve: neighbours there are neighbours in the picture.
+    pub fn along_curve(&self) -> Vec<u32> {
+        let [_, _, columns, _] = self.grid();
+        let mut order: Vec<u32> = (0..self.count()).collect();
+        order.sort_by_cached_key(|number| morton(number % columns, number / columns));
+        order
     }
 }
 

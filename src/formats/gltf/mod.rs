@@ -37,11 +37,13 @@ mod tests;
 
 use std::path::Path;
 
-use ::gltf::json::Root;
+use ::gltf::json::mesh::{Mode, Semantic};
+use ::gltf::json::validation::Checked::Valid;
+use ::gltf::json::{self, Index, Root};
 
 use crate::error::Result;
 use crate::formats::surroundings::Surroundings;
-use crate::formats::{Ledger, LoadOptions, Model};
+use crate::formats::{Ledger, LoadOptions, Model, Outline};
 use crate::progress::Progress;
 use budget::Budget;
 use buffers::Buffers;
@@ -74,6 +76,50 @@ pub fn load(path: &Path, options: &LoadOptions, progress: &dyn Progress) -> Resu
     let mut model = read().map_err(|error| error.at_path(path))?;
     model.ledger.note_file(path);
     Ok(model)
+}
+
+/// How large the meshes of a file are, by the counts in its JSON: whether a node shows them or not, each once.
+///
+/// # Errors
+/// As [`load`], for what is wrong with the container and the JSON.
+pub fn outline(path: &Path, options: &LoadOptions) -> Result<Outline> {
+    let read = || -> Result<Outline> {
+        let file = Bytes::open(path, &options.limits)?;
+        let document = Document::parse(&Container::split(&file)?.json.all()?, &mut Ledger::default())?;
+        Ok(outline_of(&document.root))
+    };
+    read().map_err(|error| error.at_path(path))
+}
+
+fn outline_of(root: &Root) -> Outline {
+    let count = |accessor: Option<Index<json::Accessor>>| {
+        accessor.and_then(|index| root.get(index)).map_or(0, |accessor| accessor.count.0)
+    };
+    let mut outline = Outline::default();
+    for mesh in &root.meshes {
+        let (mut triangles, mut vertices, mut bytes) = (0, 0, 12);
+        for primitive in &mesh.primitives {
+            let of = |wanted: Semantic| {
+                let found = primitive.attributes.iter().find(|(name, _)| **name == Valid(wanted.clone()));
+                found.map(|(_, accessor)| *accessor)
+            };
+            let positions = count(of(Semantic::Positions));
+            let corners = if primitive.indices.is_some() { count(primitive.indices) } else { positions };
+            triangles += match primitive.mode {
+                Valid(Mode::Triangles) => corners / 3,
+                Valid(Mode::TriangleStrip | Mode::TriangleFan) => corners.saturating_sub(2),
+                _ => continue,
+            };
+            vertices += positions;
+            // An attribute that one primitive has is an array for all.
+            let sizes = [(Semantic::Normals, 12), (Semantic::TexCoords(0), 8), (Semantic::TexCoords(1), 8)];
+            let own = sizes.into_iter().chain([(Semantic::Colors(0), 8), (Semantic::Tangents, 16)]);
+            bytes =
+                bytes.max(12 + own.filter(|(name, _)| of(name.clone()).is_some()).map(|(_, size)| size).sum::<u64>());
+        }
+        outline.add(triangles, vertices, bytes);
+    }
+    outline
 }
 
 /// Reads a file that is in memory; `folder` is where its relative URIs start from.
