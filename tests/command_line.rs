@@ -749,7 +749,8 @@ fn estimates_are_near_what_rendering_takes() {
     assert!(keys.clone().all(|key| !estimate[key].is_null()), "{estimate}");
     let page = &MANUAL[MANUAL.find("### `info --json`").unwrap()..];
     assert!(keys.into_iter().all(|key| page.contains(&format!("\"{key}\""))));
-    assert_eq!((estimate["tiles"].as_u64(), estimate["tried_samples"].as_u64()), (Some(70), Some(4)));
+    assert_eq!(estimate["tiles"].as_u64(), Some(70));
+    assert!([4, 20].contains(&estimate["tried_samples"].as_u64().unwrap()), "{estimate}");
     assert_eq!(json["tree"]["accelerator"], "wide");
     let text = text(&workshop.succeed("info model.obj --estimate --size 320x200 --spp 20 --machines 3"));
     assert!(

@@ -83,15 +83,14 @@ impl Estimate {
     ) -> Result<Self> {
         let film = renderer.scene().film;
         let tiles = Tiles::of(&film, None)?;
+        let measured = peak_resident_bytes().zip(resident_bytes());
         let pilot = Pilot::fly(renderer, threads, TIME, progress)?;
         let start = Instant::now();
         picture::write_png(&pilot.film, &mut std::io::sink())?;
         let write = start.elapsed().as_secs_f64();
         let build = renderer.build_stats().seconds;
         let render = pilot.seconds(pilot.threads);
-        let picture = picture_bytes(&film, None, &[]);
-        // The film that was tried is as large as the picture's; of its tiles there were fewer.
-        let measured = peak_resident_bytes().zip(resident_bytes());
+        let picture = picture_bytes(renderer.scene(), None, &[]);
         let peak_bytes = measured.map_or(needed + picture, |(peak, now)| peak.max(now + picture));
         let overhead = Overhead { load, build: build * pilot.threads as f64, write };
         let cores = arguments.cores.unwrap_or(pilot.threads as u32);

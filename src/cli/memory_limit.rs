@@ -11,12 +11,14 @@ use crate::error::{Error, Result};
 use crate::formats::{LoadOptions, Outline};
 use crate::render::world::Instance;
 use crate::render::{AovKind, Crop};
-use crate::scene::{FilmSettings, Object, Scene};
+use crate::scene::{Background, Object, Scene};
 
 /// What a picture takes while it is made: its values are in tiles and then in the film, and 8 bytes a pixel go to the file.
-pub fn picture_bytes(film: &FilmSettings, crop: Option<Crop>, aovs: &[AovKind]) -> u64 {
+pub fn picture_bytes(scene: &Scene, crop: Option<Crop>, aovs: &[AovKind]) -> u64 {
+    let film = &scene.film;
     let (width, height) = crop.map_or((film.width, film.height), |crop| (crop.x1 - crop.x0, crop.y1 - crop.y0));
-    let values = 4 + aovs.iter().map(|kind| kind.channels().len() as u64).sum::<u64>();
+    let values = if scene.background == Background::Transparent { 4 } else { 3 }
+        + aovs.iter().map(|kind| kind.channels().len() as u64).sum::<u64>();
     (2 * 4 * values + 8) * u64::from(width) * u64::from(height)
 }
 

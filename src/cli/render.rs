@@ -80,7 +80,7 @@ pub fn run(arguments: &RenderArguments) -> Result<()> {
         .then(|| job::header(&arguments.input, &ledger, &scene, &settings, &arguments.load, arguments.precision));
     let header = header.transpose()?;
     let camera = scene.cameras[scene.active_camera].clone();
-    let picture = picture_bytes(&scene.film, settings.crop, &settings.aovs);
+    let picture = picture_bytes(&scene, settings.crop, &settings.aovs);
     let params = arguments.build.params(&scene, picture)?;
     let renderer;
     (renderer, seconds.build) = timed(|| AnyRenderer::build(scene, arguments.precision, &params, &terminal));

@@ -22,6 +22,9 @@ const STEPS: u32 = 16;
 /// Samples of a pixel that are tried, where there are more.
 const SAMPLES: u32 = 4;
 
+/// This part of the tiles is to be tried with all samples, or few samples are taken.
+const LEAST_TRIED: f64 = 0.125;
+
 /// Another machine pays if it saves this part of the time.
 const WORTHWHILE: f64 = 0.05;
 
@@ -58,9 +61,18 @@ impl Pilot {
     /// As [`Renderer::render`], or a cancellation.
     pub fn fly(renderer: &mut Renderer, threads: usize, time: Duration, progress: &dyn Progress) -> Result<Self> {
         let film = renderer.scene().film;
-        let samples = film.samples.min(SAMPLES);
+        let few = film.samples.min(SAMPLES);
+        renderer.set_film(FilmSettings { samples: few, ..film });
+        // Fewer samples are dearer each: all of them are tried where there is time for some tiles.
+        let first = Self::try_tiles(renderer, threads, Duration::ZERO, progress);
+        let is_quick = first.as_ref().is_ok_and(|first| {
+            let whole =
+                first.costs.iter().sum::<f64>() / first.threads as f64 * f64::from(film.samples) / f64::from(few);
+            whole * LEAST_TRIED < time.as_secs_f64()
+        });
+        let samples = if is_quick { film.samples } else { few };
         renderer.set_film(FilmSettings { samples, ..film });
-        let tried = Self::try_tiles(renderer, threads, time, progress);
+        let tried = first.and_then(|_| Self::try_tiles(renderer, threads, time, progress));
         renderer.set_film(film);
         let Tried { costs, count, threads, film: picture } = tried?;
         let share = f64::from(film.samples) / f64::from(samples);
