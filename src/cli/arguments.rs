@@ -347,7 +347,11 @@ impl BuildArguments {
     /// # Errors
     /// How much is needed and what helps.
     pub fn refuse_what_does_not_fit(&self, input: &Path, options: &LoadOptions) -> Result<()> {
-        refuse_what_does_not_fit(input, options, self.accelerator, self.memory_limit)
+        // Who names a structure wants it whatever it takes.
+        if self.accelerator != Kind::Auto {
+            return Ok(());
+        }
+        refuse_what_does_not_fit(input, options, self.memory_limit)
     }
 
     /// Says that nothing keeps a limit of memory with a flag that leaves no choice of structures.

@@ -26,7 +26,8 @@ pub struct JobArguments {
     /// Keep finished tiles in `OUT.tiles` while rendering, and go on with those that an earlier process kept there.
     #[arg(long)]
     pub resume: bool,
-    /// Stop in good order after this time, such as 90s, 45m, 1h30m or 1:30:00, with exit code 75.
+    /// Stop in good order after this time, such as 90s, 45m, 1h30m or 1:30:00, with exit code 75. With --resume, and for frames
+    /// with --skip-existing, the same command goes on.
     #[arg(long, value_name = "TIME", value_parser = values::duration)]
     pub time_limit: Option<Duration>,
     /// Render the K-th of N equal shares: of a picture to `OUT.KofN.part`, for `whitted merge`; of frames, every N-th. `auto` takes
@@ -151,7 +152,7 @@ pub fn header(
 }
 
 /// Renders what is not kept of a picture or a share, and keeps what is finished. The film has all tiles that are finished; it is complete if
-/// those that the header asks for are. A share's file is written.
+/// those that the header asks for are. A share's file is written. What keeps tiles is for the caller to remove, once all is written.
 ///
 /// # Errors
 /// What is kept is of another picture, or is being kept by another process; those of rendering and writing.
@@ -162,7 +163,7 @@ pub fn render(
     target: &Path,
     resume: bool,
     progress: &Terminal,
-) -> Result<Film> {
+) -> Result<(Film, Option<Kept>)> {
     let opened = if resume { Some(Kept::open(&kept_file(target), header)?) } else { None };
     let (kept, found) = opened.unzip();
     let found = found.unwrap_or_default();
@@ -204,13 +205,13 @@ pub fn render(
         terminal::report(&format!("warning: not all tiles could be kept: {failure}"));
     }
     if !film.complete {
-        if let Some(kept) = kept {
+        if let Some(kept) = &kept {
             kept.sync()?;
             let path = kept_file(target);
             let stopped = format!("stopped: finished tiles are kept in {}; the same command goes on", path.display());
             terminal::report(&stopped);
         }
-        return Ok(film);
+        return Ok((film, kept));
     }
     found.tiles.iter().for_each(|tile| film.put(tile));
     if header.share.is_some() {
@@ -219,16 +220,7 @@ pub fn render(
         tiles.sort_by_key(|tile| tile.number);
         write_part(target, header, &tiles)?;
     }
-    Ok(film)
-}
-
-/// Deletes what was kept of a picture that is written.
-///
-/// # Errors
-/// The system's.
-pub fn forget(target: &Path) -> Result<()> {
-    let path = kept_file(target);
-    std::fs::remove_file(&path).map_err(|cause| Error::system(&path, cause))
+    Ok((film, kept))
 }
 
 /// Flags of `merge`.

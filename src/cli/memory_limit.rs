@@ -29,13 +29,16 @@ pub fn available_bytes() -> Option<u64> {
     let of_system = parse_kibibytes(&read("/proc/meminfo"), "MemAvailable:");
     let own_group = read("/proc/self/cgroup");
     let group = own_group.lines().find_map(|line| line.strip_prefix("0::")).unwrap_or("/");
-    let folder = format!("/sys/fs/cgroup{}", group.trim_end_matches('/'));
-    let most = read(&format!("{folder}/memory.max")).trim().parse::<u64>().ok();
-    // What files are kept in memory for speed gives way.
-    let taken =
-        read(&format!("{folder}/memory.stat")).lines().find_map(|line| line.strip_prefix("anon ")?.parse().ok());
-    let of_group = most.map(|most| most.saturating_sub(taken.unwrap_or(0)));
-    of_system.into_iter().chain(of_group).min()
+    // Batch systems limit a group above the process's own.
+    let of_groups = Path::new(group).ancestors().filter_map(|group| {
+        let folder = format!("/sys/fs/cgroup{}", group.display());
+        let most = read(&format!("{folder}/memory.max")).trim().parse::<u64>().ok()?;
+        // What is kept of files in memory for speed gives way.
+        let stat = read(&format!("{folder}/memory.stat"));
+        let taken = stat.lines().find_map(|line| line.strip_prefix("anon ")?.parse().ok());
+        Some(most.saturating_sub(taken.unwrap_or(0)))
+    });
+    of_system.into_iter().chain(of_groups).min()
 }
 
 /// Refuses a scene whose triangles alone take more while structures are built than `limit`, or else than the machine has to spare, before
@@ -43,34 +46,28 @@ pub fn available_bytes() -> Option<u64> {
 ///
 /// # Errors
 /// Says how much is needed and what helps. What is wrong with the files is not told here.
-pub fn refuse_what_does_not_fit(input: &Path, options: &LoadOptions, kind: Kind, limit: Option<u64>) -> Result<()> {
+pub fn refuse_what_does_not_fit(input: &Path, options: &LoadOptions, limit: Option<u64>) -> Result<()> {
     let Ok(outline) = Outline::of(input, options) else { return Ok(()) };
     let Some(room) = limit.or_else(available_bytes) else { return Ok(()) };
     let needed = |kind: Kind| {
         let triangles = outline.triangles.iter().copied();
         outline.geometry_bytes.saturating_add(kind.peak_bytes(triangles, rayon::current_num_threads()))
     };
-    // Where there is a choice, the compact one is what can be had.
-    let least = if kind == Kind::Auto { Kind::Compact } else { kind };
-    if !matches!(least, Kind::Wide | Kind::Compact) || needed(least) <= room {
+    if needed(Kind::Compact) <= room {
         return Ok(());
     }
     let triangles: usize = outline.triangles.iter().sum();
     let (wide, compact) = (readable(needed(Kind::Wide)), readable(needed(Kind::Compact)));
     let whose = if limit.is_some() { "--memory-limit allows" } else { "this machine has to spare" };
     let error = Error::limit(format!(
-        "rendering about {triangles} triangles takes {wide}, or {compact} with --accelerator compact, and {whose} {}",
+        "rendering about {triangles} triangles takes {wide} with the fastest structure, {compact} with --accelerator compact, and \
+         {whose} {}",
         readable(room)
     ));
-    Err(error.at_path(input).remedy(match (limit, least) {
-        (_, Kind::Wide) => "leave out --accelerator wide, take a smaller model, or raise --memory-limit".to_owned(),
-        (Some(_), _) => "raise the limit, or take a smaller model".to_owned(),
-        (None, _) => {
-            format!(
-                "take a smaller model or a larger machine, or insist with --memory-limit {}G",
-                (needed(least) >> 30) + 1
-            )
-        }
+    Err(error.at_path(input).remedy(if limit.is_some() {
+        "raise the limit, or take a smaller model"
+    } else {
+        "take a smaller model or a larger machine; with --memory-limit or --accelerator it is tried all the same"
     }))
 }
 
@@ -97,10 +94,7 @@ pub fn kind_that_fits(scene: &Scene, picture: u64) -> Result<Kind> {
         "the scene takes about {compact} with the most compact structure, and this machine has {} to spare",
         readable(room)
     ))
-    .remedy(format!(
-        "take a smaller model or picture, or insist with --memory-limit {}G",
-        (needed(Kind::Compact) >> 30) + 1
-    )))
+    .remedy("take a smaller model or picture; with --memory-limit or --accelerator compact it is tried all the same"))
 }
 
 /// Bytes of a scene without its structures.

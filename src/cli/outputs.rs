@@ -144,11 +144,12 @@ impl Outputs {
     /// # Errors
     /// Those of writing.
     pub fn write(&self, film: &Film) -> Result<()> {
+        // The picture comes last: where it is, all is.
+        self.aov_file.as_deref().map_or(Ok(()), |path| picture::save(film, path))?;
         match &self.picture {
-            Picture::Stdout => write_to_stdout(film)?,
-            Picture::File(path) => picture::save(film, path)?,
+            Picture::Stdout => write_to_stdout(film),
+            Picture::File(path) => picture::save(film, path),
         }
-        self.aov_file.as_deref().map_or(Ok(()), |path| picture::save(film, path))
     }
 
     /// The file that the tiles of this process go to: the part's, or else the picture's.
@@ -165,13 +166,18 @@ impl Outputs {
         self.files().chain(self.partial.as_deref()).try_for_each(|path| refuse_inputs(path, inputs.iter().copied()))
     }
 
-    /// The files that a finished rendering writes.
-    fn files(&self) -> impl Iterator<Item = &Path> {
-        let picture = match &self.part {
+    /// The picture and what belongs to it, or the part.
+    pub fn pictures(&self) -> impl Iterator<Item = &Path> {
+        let files = match &self.part {
             Some(part) => [Some(part.as_path()), None],
             None => [self.picture.path(), self.aov_file.as_deref()],
         };
-        picture.into_iter().chain([self.scene.as_deref(), self.stats.as_deref()]).flatten()
+        files.into_iter().flatten()
+    }
+
+    /// The files that a finished rendering writes.
+    fn files(&self) -> impl Iterator<Item = &Path> {
+        self.pictures().chain([self.scene.as_deref(), self.stats.as_deref()].into_iter().flatten())
     }
 
     /// Fails if the file exists and must stay.

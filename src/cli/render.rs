@@ -11,6 +11,7 @@ use super::stats_json::{Bytes, SCHEMA, Seconds, Settings, Stats, timed};
 use super::terminal::{self, Terminal};
 use super::{camera, job, outputs};
 use crate::error::{Error, Result};
+use crate::formats::atomic_file::sync;
 use crate::formats::reach::PixelCounts;
 use crate::formats::{self, Ledger, picture};
 use crate::job::Header;
@@ -36,7 +37,7 @@ pub fn run(arguments: &RenderArguments) -> Result<()> {
         None => vec![(None, outputs)],
         Some(frames) => frames.map(|frame| Ok((Some(frame), outputs.for_frame(frame)?))).collect::<Result<_>>()?,
     };
-    let is_there = |outputs: &Outputs| outputs.target().is_some_and(Path::exists);
+    let is_there = |outputs: &Outputs| outputs.pictures().next().is_some() && outputs.pictures().all(Path::exists);
     pictures.retain(|(_, outputs)| !(arguments.job.skip_existing && is_there(outputs)));
     if pictures.is_empty() {
         return Ok(());
@@ -120,10 +121,10 @@ impl Work<'_> {
         let film;
         (film, seconds.render) = timed(|| match (&header, outputs.target()) {
             (Some(header), Some(target)) => job::render(renderer, header, settings, target, resume, terminal),
-            _ => renderer.render_tiles(settings, *terminal, &|_| ()),
+            _ => Ok((renderer.render_tiles(settings, *terminal, &|_| ())?, None)),
         });
         terminal.clear();
-        let film = film?;
+        let (film, kept) = film?;
         report_time(arguments, "render", seconds.render);
         if arguments.verbose {
             report_ledger(ledger, renderer.scene(), &film);
@@ -136,8 +137,9 @@ impl Work<'_> {
             (written, seconds.write) = timed(|| outputs.write(&film));
             written?;
         }
-        if let Some(target) = outputs.target().filter(|_| resume) {
-            job::forget(target)?;
+        if let Some(kept) = kept {
+            outputs.pictures().try_for_each(sync)?;
+            kept.remove()?;
         }
         report_time(arguments, "write", seconds.write);
         if arguments.verbose {

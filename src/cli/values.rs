@@ -139,6 +139,9 @@ pub fn duration(text: &str) -> Result<Duration, String> {
         seconds = count.checked_mul(unit).and_then(|more| seconds.checked_add(more)).ok_or_else(expected)?;
         Ok::<(), String>(())
     };
+    if !text.is_ascii() {
+        return Err(expected());
+    }
     if text.contains(':') {
         let parts: Vec<&str> = text.split(':').collect();
         if parts.len() > 3 {
@@ -190,6 +193,29 @@ fn list<T: FromStr, const N: usize>(text: &str) -> Option<[T; N]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn spans_of_time_are_read_as_people_write_them() {
+        let seconds = |text: &str| duration(text).map(|span| span.as_secs()).ok();
+        for (text, expected) in
+            [("90", 90), ("90s", 90), ("45m", 2700), ("1h30m", 5400), ("2d", 172_800), ("1:30:00", 5400), ("2:05", 125)]
+        {
+            assert_eq!(seconds(text), Some(expected), "{text}");
+        }
+        for flawed in
+            ["", "0", "s", "5\u{e9}", "90\u{b5}", "1x", "-5", "1:2:3:4", "99999999999999999999", "1.5h", "1h:3"]
+        {
+            assert_eq!(seconds(flawed), None, "{flawed}");
+        }
+    }
+
+    #[test]
+    fn ranges_of_frames_are_read() {
+        assert_eq!([frames("1..250"), frames("-3..-1"), frames("7")], [Ok((1, 250)), Ok((-3, -1)), Ok((7, 7))]);
+        for flawed in ["", "5..1", "a..b", "1...3", "1..", "..2", "1..9999999"] {
+            assert!(frames(flawed).is_err(), "{flawed}");
+        }
+    }
 
     #[test]
     fn sizes_are_read_and_bad_ones_explained() {

@@ -54,6 +54,21 @@ pub fn check_writable(path: &Path) -> Result<()> {
     }
 }
 
+/// Brings a file that was written, and its name, to the disk.
+///
+/// # Errors
+/// The system's.
+pub fn sync(path: &Path) -> Result<()> {
+    let system = |cause| Error::system(path, cause);
+    fs::File::open(path).and_then(|file| file.sync_all()).map_err(system)?;
+    #[cfg(unix)]
+    {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        fs::File::open(folder).and_then(|folder| folder.sync_all()).map_err(system)?;
+    }
+    Ok(())
+}
+
 /// Whether a path leads to what this process has open already, by its number.
 fn is_descriptor(path: &Path) -> bool {
     /// Links that are followed; more are a circle.

@@ -175,9 +175,14 @@ pub struct Shared {
 impl Shared {
     /// Predicts the time of machines that each read and build the scene and render a share of the tiles.
     pub fn predict(pilot: &Pilot, tiles: &Tiles, overhead: &Overhead, machines: u32, cores: u32) -> Self {
+        Self::along(pilot, &tiles.along_curve(), overhead, machines, cores)
+    }
+
+    /// The same, for tiles in the order in which they are dealt out.
+    fn along(pilot: &Pilot, curve: &[u32], overhead: &Overhead, machines: u32, cores: u32) -> Self {
         let share = |number: u32| {
-            let own = tiles.share(number, machines);
-            schedule(own.iter().map(|&tile| pilot.costs.get(tile as usize).copied().unwrap_or(0.0)), cores as usize)
+            let own = curve.iter().skip(number as usize).step_by(machines.max(1) as usize);
+            schedule(own.map(|&tile| pilot.costs.get(tile as usize).copied().unwrap_or(0.0)), cores as usize)
         };
         let shares: Vec<f64> = (0..machines).map(share).collect();
         let longest = shares.iter().copied().fold(0.0, f64::max);
@@ -193,7 +198,8 @@ impl Shared {
 
     /// The number of such machines from which on twice as many save less than a twentieth of the time.
     pub fn worthwhile(pilot: &Pilot, tiles: &Tiles, overhead: &Overhead, cores: u32) -> u32 {
-        let seconds = |machines: u32| Self::predict(pilot, tiles, overhead, machines, cores).seconds;
+        let curve = tiles.along_curve();
+        let seconds = |machines: u32| Self::along(pilot, &curve, overhead, machines, cores).seconds;
         let mut machines = 1;
         let mut now = seconds(machines);
         while machines < MOST_MACHINES {

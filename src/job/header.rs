@@ -67,6 +67,10 @@ impl Header {
     /// Says what is not.
     pub fn check(&self) -> Result<()> {
         self.tiles()?;
+        let places: Vec<_> = self.aovs.iter().map(|kind| AovKind::ALL.iter().position(|known| known == kind)).collect();
+        if !places.is_sorted_by(|one, next| one < next) {
+            return Err(Error::file("a kind of extra values is there twice, or not in its place"));
+        }
         match self.share {
             Some(Share { number, of }) if !(1..=of).contains(&number) || of > Share::MOST => {
                 Err(Error::file(format!("there is no share {number} of {of}")))

@@ -7,7 +7,6 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use crate::error::{Error, Result};
-use crate::formats::atomic_file::write_atomically;
 use crate::job::Header;
 use crate::job::tile_file::{self, Key};
 use crate::render::Tile;
@@ -39,19 +38,11 @@ pub struct Found {
     pub damaged: Vec<usize>,
 }
 
-impl Kept {
-    /// Opens the file of a picture and reads its tiles, or begins one.
-    ///
-    /// # Errors
-    /// A file of another picture, with what differs; one whose header is damaged; one that another process has open; the
-    /// system's.
-    pub fn open(path: &Path, header: &Header) -> Result<(Self, Found)> {
-        let system = |cause| Error::system(path, cause);
-        let (start, key) = tile_file::begin(header);
-        if !path.exists() {
-            write_atomically(path, |sink| sink.write_all(&start).map_err(system))?;
-        }
-        let mut file = OpenOptions::new().read(true).write(true).open(path).map_err(system)?;
+/// Opens a file, or creates it, and locks it against other processes.
+fn open_locked(path: &Path) -> Result<File> {
+    let system = |cause| Error::system(path, cause);
+    loop {
+        let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path).map_err(system)?;
         match file.try_lock() {
             Err(TryLockError::WouldBlock) => {
                 return Err(Error::caller("another process keeps the tiles of this picture here")
@@ -61,17 +52,54 @@ impl Kept {
             // Some file systems have no locks.
             Ok(()) | Err(TryLockError::Error(_)) => {}
         }
+        // Another process may have deleted it before it was locked.
+        if is_at(&file, path) {
+            return Ok(file);
+        }
+    }
+}
+
+/// Whether a path leads to an open file.
+#[cfg(unix)]
+fn is_at(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let identity = |metadata: std::fs::Metadata| (metadata.dev(), metadata.ino());
+    let (own, there) = (file.metadata().map(identity), std::fs::metadata(path).map(identity));
+    own.is_ok_and(|own| there.is_ok_and(|there| own == there))
+}
+
+/// Elsewhere open files are not deleted.
+#[cfg(not(unix))]
+fn is_at(_: &File, path: &Path) -> bool {
+    path.exists()
+}
+
+impl Kept {
+    /// Opens the file of a picture and reads its tiles, or begins one.
+    ///
+    /// # Errors
+    /// A file of another picture, with what differs; one whose header is damaged; one that another process has open; the
+    /// system's.
+    pub fn open(path: &Path, header: &Header) -> Result<(Self, Found)> {
+        let system = |cause| Error::system(path, cause);
+        let (start, key) = tile_file::begin(header);
+        let mut file = open_locked(path)?;
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes).map_err(system)?;
+        // A file that is new, or whose process was killed before it was more than begun.
+        if bytes.len() < start.len() && start.starts_with(&bytes) {
+            let begun = file.rewind().and_then(|()| file.write_all(&start)).and_then(|()| file.sync_all());
+            begun.map_err(system)?;
+            bytes = start;
+        }
         let content = tile_file::parse(&bytes, path)?;
         drop(bytes);
-        if let Some(difference) = header.difference(&content.header) {
-            return Err(Error::caller(format!("the tiles that are kept here are of another picture: {difference}"))
-                .at_path(path)
-                .remedy("delete the file to begin again, or write to another one"));
-        }
         if content.key != key {
-            return Err(Error::caller("the tiles that are kept here are of another share of the picture")
+            let what = match header.difference(&content.header) {
+                Some(difference) => format!("picture: {difference}"),
+                None => "share of the picture".into(),
+            };
+            return Err(Error::caller(format!("the tiles that are kept here are of another {what}"))
                 .at_path(path)
                 .remedy("delete the file to begin again, or write to another one"));
         }
@@ -82,6 +110,17 @@ impl Kept {
         found.tiles.dedup_by_key(|tile| tile.number);
         let growing = Growing { file, synced: Instant::now(), failed: None };
         Ok((Self { path: path.to_path_buf(), key, file: Mutex::new(growing) }, found))
+    }
+
+    /// Deletes the file, once what was made of its tiles is on the disk.
+    ///
+    /// # Errors
+    /// The system's.
+    pub fn remove(self) -> Result<()> {
+        match std::fs::remove_file(&self.path) {
+            Err(cause) if cause.kind() != std::io::ErrorKind::NotFound => Err(Error::system(&self.path, cause)),
+            _ => Ok(()),
+        }
     }
 
     /// Appends a tile. After a failure nothing more is kept; [`failure`](Self::failure) tells of it.

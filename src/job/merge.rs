@@ -24,14 +24,14 @@ pub fn write_part(path: &Path, header: &Header, tiles: &[Tile]) -> Result<()> {
 /// are missing, by number.
 pub fn merge(paths: &[PathBuf], progress: &dyn Progress) -> Result<Film> {
     progress.begin("merge", paths.len() as u64);
-    let mut picture: Option<(Film, Header, &Path, u32)> = None;
-    let mut parts: BTreeMap<u32, &Path> = BTreeMap::new();
+    let mut picture: Option<(Header, &Path, u32)> = None;
+    let mut parts: BTreeMap<u32, Vec<Tile>> = BTreeMap::new();
     for path in paths {
         progress.check()?;
         let (header, share, tiles) = read_part(path)?;
-        let (film, first, first_path, of) = match &mut picture {
+        let (first, first_path, of) = match &mut picture {
             Some(picture) => picture,
-            None => picture.insert((header.blank()?, header.clone(), path, share.of)),
+            None => picture.insert((header.clone(), path, share.of)),
         };
         let foreign = |what: String| {
             Error::caller(format!("this part and `{}` are not of one picture: {what}", first_path.display()))
@@ -44,12 +44,10 @@ pub fn merge(paths: &[PathBuf], progress: &dyn Progress) -> Result<Film> {
         if share.of != *of {
             return Err(foreign(format!("one of {} parts and one of {of}", share.of)));
         }
-        if parts.insert(share.number, path).is_none() {
-            tiles.iter().for_each(|tile| film.put(tile));
-        }
+        parts.insert(share.number, tiles);
         progress.advance(1);
     }
-    let Some((mut film, _, _, of)) = picture else {
+    let Some((header, _, of)) = picture else {
         return Err(Error::caller("no parts were given").remedy("name the files that `whitted render --part` wrote"));
     };
     let missing: Vec<u32> = (1..=of).filter(|number| !parts.contains_key(number)).collect();
@@ -57,6 +55,8 @@ pub fn merge(paths: &[PathBuf], progress: &dyn Progress) -> Result<Film> {
         return Err(Error::caller(format!("of {of} parts {} missing", listed(&missing)))
             .remedy("render them, and give all parts"));
     }
+    let mut film = header.blank()?;
+    parts.values().flatten().for_each(|tile| film.put(tile));
     film.complete = true;
     Ok(film)
 }

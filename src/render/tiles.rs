@@ -78,9 +78,12 @@ impl Tiles {
 
     /// Where a tile is; `None` if there is none of this number.
     pub fn tile(&self, number: u32) -> Option<Crop> {
+        if number >= self.count() {
+            return None;
+        }
         let [x, y, columns, _] = self.grid();
         let (x, y) = ((x + number % columns) * SIDE, (y + number / columns) * SIDE);
-        (number < self.count()).then(|| Crop {
+        Some(Crop {
             x0: x.max(self.area.x0),
             y0: y.max(self.area.y0),
             x1: x.saturating_add(SIDE).min(self.area.x1),
@@ -132,7 +135,7 @@ mod tests {
                 }
             }
             assert_eq!(seen.len() as u32, area.width() * area.height());
-            assert_eq!(tiles.tile(tiles.count()), None);
+            assert_eq!([tiles.tile(tiles.count()), tiles.tile(u32::MAX)], [None, None]);
         }
     }
 

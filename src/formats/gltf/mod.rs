@@ -93,7 +93,13 @@ pub fn outline(path: &Path, options: &LoadOptions) -> Result<Outline> {
 
 fn outline_of(root: &Root) -> Outline {
     let count = |accessor: Option<Index<json::Accessor>>| {
-        accessor.and_then(|index| root.get(index)).map_or(0, |accessor| accessor.count.0)
+        let accessor = accessor.and_then(|index| root.get(index));
+        // A count that its bytes cannot hold is a mistake, which the reader tells.
+        let most = |accessor: &json::Accessor| {
+            let view = accessor.buffer_view.and_then(|view| root.get(view));
+            view.map_or(u64::from(u32::MAX), |view| view.byte_length.0)
+        };
+        accessor.map_or(0, |accessor| if accessor.count.0 <= most(accessor) { accessor.count.0 } else { 0 })
     };
     let mut outline = Outline::default();
     for mesh in &root.meshes {
