@@ -324,6 +324,49 @@ fn frames_follow_the_path_alone_or_in_shares() {
 }
 
 #[test]
+fn a_frame_is_the_picture_of_a_camera_that_stands_there() {
+    let workshop = workshop();
+    // Images are read by how large pixels are, which the camera decides; lights of a model follow it.
+    workshop.write("t.mtl", "newmtl t\nKd 1 1 1\nmap_Kd t.png\n");
+    workshop.write(
+        "t.obj",
+        "mtllib t.mtl\nv -9 0 -9\nv 9 0 -9\nv 9 0 9\nv -9 0 9\nvt 0 0\nvt 9 0\nvt 9 9\nvt 0 9\nusemtl t\nf 4/4 3/3 2/2 1/1\n",
+    );
+    let checker =
+        image::RgbImage::from_fn(64, 64, |x, y| image::Rgb([if (x / 4 + y / 4) % 2 == 0 { 255 } else { 20 }; 3]));
+    checker.save(workshop.path("t.png")).unwrap();
+    let scene = |eye: &str, path: &str| {
+        format!(
+            "[film]\nsize = [90, 60]\nsamples = 1\n[camera]\neye = {eye}\ntarget = [0, 0, 0]\n{path}\n\
+             [[light]]\nkind = \"point\"\nposition = [3, 5, 4]\n[[object]]\nmesh = \"t.obj\"\n"
+        )
+    };
+    workshop.write(
+        "way.toml",
+        &scene("[0, 0.5, 2]", "path = [{ frame = 1, eye = [0, 0.5, 2] }, { frame = 2, eye = [0, 9, 60] }]"),
+    );
+    workshop.write("there.toml", &scene("[0, 9, 60]", ""));
+    workshop.succeed("render way.toml --frames 1..2 -o way.{frame}.png");
+    workshop.succeed("render there.toml -o there.png");
+    let read = |name: &str| fs::read(workshop.path(name)).unwrap();
+    assert!(read("way.0002.png") == read("there.png"));
+
+    // Half-way around, the back: as bright as the front of a model that is the same from both sides.
+    workshop.write(
+        "cube.obj",
+        "v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1\n\
+        f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 4 8 7 3\nf 1 5 8 4\nf 2 3 7 6\n",
+    );
+    workshop.succeed("render cube.obj --size 60x60 --spp 1 --turntable 4 -o cube.{frame}.png");
+    let sum = |name: &str| -> u64 {
+        let picture = image::open(workshop.path(name)).unwrap().to_rgb8();
+        picture.pixels().map(|pixel| u64::from(pixel.0[0])).sum()
+    };
+    let (front, back) = (sum("cube.0000.png"), sum("cube.0002.png"));
+    assert!(front.abs_diff(back) * 200 < front, "{front} {back}");
+}
+
+#[test]
 fn tiles_need_a_file() {
     let workshop = workshop();
     for flag in ["--resume", "--part 1/2"] {

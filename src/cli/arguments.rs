@@ -12,7 +12,7 @@ use super::edit::EditArguments;
 use super::estimate::EstimateArguments;
 use super::explain::ExplainArguments;
 use super::job::{JobArguments, MergeArguments};
-use super::memory_limit::{kind_that_fits, kind_within, refuse_what_does_not_fit};
+use super::memory_limit::{kind_within, refuse_what_does_not_fit};
 use super::precision::Precision;
 use super::query::QueryArguments;
 use super::report::ReportArguments;
@@ -332,10 +332,9 @@ impl BuildArguments {
     /// # Errors
     /// When nothing fits the limit of memory.
     pub fn params(&self, scene: &Scene, picture: u64) -> Result<Params> {
-        let kind = match self.memory_limit {
-            Some(limit) => kind_within(limit, scene, picture)?,
-            None if self.accelerator == Kind::Auto => kind_that_fits(scene, picture)?,
-            None => self.accelerator,
+        let kind = match self.accelerator {
+            Kind::Auto => kind_within(self.memory_limit, scene, picture)?,
+            kind => kind,
         };
         Ok(Params { kind, preset: self.preset })
     }

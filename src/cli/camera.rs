@@ -10,11 +10,19 @@ const NAME: &str = "command line";
 
 /// Makes the camera that was asked for the scene's active one, and has automatic lights follow it.
 ///
-/// The film's size must be final, since framing depends on it; `resized` says whether it differs from the file's.
+/// The film's size must be final, since framing depends on it; `resized` says whether it differs from the file's. A camera that `turns`
+/// around the scene, and is to show all of it, leaves room for that.
 ///
 /// # Errors
 /// A camera name that the scene does not have, or a field of view for a camera that has none.
-pub fn choose(scene: &mut Scene, automatic: Automatic, arguments: &CameraArguments, resized: bool) -> Result<()> {
+pub fn choose(
+    scene: &mut Scene,
+    automatic: Automatic,
+    arguments: &CameraArguments,
+    resized: bool,
+    turns: bool,
+) -> Result<()> {
+    let frame = if turns { auto::frame_turning } else { auto::frame };
     if let Some(name) = &arguments.camera {
         scene.active_camera = scene
             .cameras
@@ -24,9 +32,13 @@ pub fn choose(scene: &mut Scene, automatic: Automatic, arguments: &CameraArgumen
     }
     let orbit = arguments.orbit.map(|orbit| (orbit.azimuth, orbit.elevation));
     if let Some((azimuth, elevation)) = arguments.view.map(View::angles).or(orbit) {
-        let camera = auto::frame(scene, azimuth, elevation, arguments.fov.unwrap_or(default_fov()));
+        let camera = frame(scene, azimuth, elevation, arguments.fov.unwrap_or(default_fov()));
         scene.active_camera = scene.cameras.len();
         scene.cameras.push(NamedCamera::new(NAME, camera));
+    } else if automatic.camera && turns {
+        let (azimuth, elevation) = auto::DEFAULT_ANGLES;
+        scene.cameras[scene.active_camera].camera =
+            frame(scene, azimuth.to_radians(), elevation.to_radians(), arguments.fov.unwrap_or(default_fov()));
     } else if automatic.camera {
         if resized || arguments.fov.is_some() {
             scene.cameras[scene.active_camera].camera =
@@ -84,7 +96,7 @@ mod tests {
     const NOTHING: Automatic = Automatic { camera: false, lights: false, room: None };
 
     fn asked(scene: &mut Scene, arguments: CameraArguments) -> Result<()> {
-        choose(scene, NOTHING, &arguments, false)
+        choose(scene, NOTHING, &arguments, false, false)
     }
 
     #[test]
@@ -129,13 +141,13 @@ mod tests {
         let (mut scene, automatic) = bare_model();
         let before = eye(&scene);
         scene.film.width = 360;
-        choose(&mut scene, automatic, &CameraArguments::default(), true).unwrap();
+        choose(&mut scene, automatic, &CameraArguments::default(), true, false).unwrap();
         // A quarter of the width holds as much from four times as far, but for the model's depth.
         let ratio = eye(&scene).length() / before.length();
         assert!((3.0..4.5).contains(&ratio), "{ratio}");
 
         let before = eye(&scene);
-        choose(&mut scene, NOTHING, &CameraArguments::default(), true).unwrap();
+        choose(&mut scene, NOTHING, &CameraArguments::default(), true, false).unwrap();
         assert_eq!(eye(&scene), before);
     }
 
@@ -146,14 +158,14 @@ mod tests {
             LightKind::Directional { direction } => direction,
             _ => panic!(),
         };
-        choose(&mut scene, automatic, &CameraArguments { view: Some(View::Front), ..Default::default() }, false)
+        choose(&mut scene, automatic, &CameraArguments { view: Some(View::Front), ..Default::default() }, false, false)
             .unwrap();
         assert!(key(&scene).z < 0.0, "the key light comes from the camera's side");
         let back = CameraArguments { view: Some(View::Back), ..Default::default() };
-        choose(&mut scene, automatic, &back, false).unwrap();
+        choose(&mut scene, automatic, &back, false, false).unwrap();
         assert!(key(&scene).z > 0.0);
         let front = CameraArguments { view: Some(View::Front), ..Default::default() };
-        choose(&mut scene, Automatic { lights: false, ..automatic }, &front, false).unwrap();
+        choose(&mut scene, Automatic { lights: false, ..automatic }, &front, false, false).unwrap();
         assert!(key(&scene).z > 0.0);
     }
 }

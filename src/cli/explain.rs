@@ -78,7 +78,7 @@ pub fn run(arguments: &ExplainArguments) -> Result<()> {
     let Loaded { mut scene, ledger, automatic } = loaded?;
     ledger::report(&arguments.input, &ledger, &scene, Told::Warnings, arguments.load.strict)?;
     arguments.film.apply(&mut scene.film);
-    camera::choose(&mut scene, automatic, &arguments.camera, arguments.film.size.is_some())?;
+    camera::choose(&mut scene, automatic, &arguments.camera, arguments.film.size.is_some(), false)?;
 
     let renderer = arguments.build.params(&scene, 0).and_then(|params| Renderer::build(scene, &params, &terminal));
     terminal.clear();

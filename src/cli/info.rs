@@ -184,7 +184,7 @@ pub fn run(arguments: &InfoArguments) -> Result<()> {
     let Loaded { mut scene, ledger, automatic } = loaded?;
     if arguments.estimate.values.size.is_some() {
         arguments.estimate.values.apply(&mut scene.film);
-        camera::choose(&mut scene, automatic, &CameraArguments::default(), true)?;
+        camera::choose(&mut scene, automatic, &CameraArguments::default(), true, false)?;
     } else {
         arguments.estimate.values.apply(&mut scene.film);
     }

@@ -1,5 +1,6 @@
 //! Long work and shared work: what of a picture is to be rendered here, what is done already, and when to stop.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
@@ -167,26 +168,18 @@ pub fn render(
     let opened = if resume { Some(Kept::open(&kept_file(target), header)?) } else { None };
     let (kept, found) = opened.unzip();
     let found = found.unwrap_or_default();
-    if let Some(at) = found.damaged.first() {
+    if let Some(at) = found.damaged {
         let path = kept_file(target);
         terminal::report(&format!(
-            "warning: {}: the record at byte {at} is damaged or not whole: its tile is rendered again",
+            "warning: {}: the record at byte {at} is damaged or not whole: tiles of such records are rendered again",
             path.display()
         ));
     }
-    let wanted = header.wanted()?;
-    let mut done = found.tiles.iter().map(|tile| tile.number).peekable();
-    let missing: Vec<u32> = wanted
-        .iter()
-        .copied()
-        .filter(|number| {
-            while done.next_if(|done| done < number).is_some() {}
-            done.next_if_eq(number).is_none()
-        })
-        .collect();
+    let done: HashSet<u32> = found.tiles.iter().map(|tile| tile.number).collect();
+    let missing = header.wanted()?.into_iter().filter(|number| !done.contains(number)).collect();
     let settings = RenderSettings {
         coverage: settings.coverage && found.tiles.is_empty(),
-        tiles: Some(missing.clone()),
+        tiles: Some(missing),
         ..settings.clone()
     };
     let own = Mutex::new(Vec::new());

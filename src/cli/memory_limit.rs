@@ -58,7 +58,7 @@ pub fn refuse_what_does_not_fit(input: &Path, options: &LoadOptions, limit: Opti
     }
     let triangles: usize = outline.triangles.iter().sum();
     let (wide, compact) = (readable(needed(Kind::Wide)), readable(needed(Kind::Compact)));
-    let whose = if limit.is_some() { "--memory-limit allows" } else { "this machine has to spare" };
+    let whose = whose(limit);
     let error = Error::limit(format!(
         "rendering about {triangles} triangles takes {wide} with the fastest structure, {compact} with --accelerator compact, and \
          {whose} {}",
@@ -69,32 +69,6 @@ pub fn refuse_what_does_not_fit(input: &Path, options: &LoadOptions, limit: Opti
     } else {
         "take a smaller model or a larger machine; with --memory-limit or --accelerator it is tried all the same"
     }))
-}
-
-/// The fastest structure that fits what the machine has to spare; if the fast one does not, that is told.
-///
-/// # Errors
-/// When the most compact one takes more.
-pub fn kind_that_fits(scene: &Scene, picture: u64) -> Result<Kind> {
-    let Some((spare, own)) = available_bytes().zip(resident_bytes()) else { return Ok(Kind::Auto) };
-    let needed = |kind: Kind| needed_bytes(scene, kind) + picture;
-    let room = spare + own;
-    if needed(Kind::Wide) <= room {
-        return Ok(Kind::Auto);
-    }
-    let (wide, compact) = (readable(needed(Kind::Wide)), readable(needed(Kind::Compact)));
-    if needed(Kind::Compact) <= room {
-        terminal::report(&format!(
-            "note: the compact structure is built, in {compact}: the fastest takes {wide}, and there are {} to spare",
-            readable(room)
-        ));
-        return Ok(Kind::Compact);
-    }
-    Err(Error::limit(format!(
-        "the scene takes about {compact} with the most compact structure, and this machine has {} to spare",
-        readable(room)
-    ))
-    .remedy("take a smaller model or picture; with --memory-limit or --accelerator compact it is tried all the same"))
 }
 
 /// Bytes of a scene without its structures.
@@ -109,22 +83,33 @@ pub fn needed_bytes(scene: &Scene, kind: Kind) -> u64 {
     other_bytes(scene) + kind.resolve().peak_bytes(triangles, rayon::current_num_threads())
 }
 
-/// The fastest structure with which a scene that is loaded, its structures being built, and a picture of so many bytes take at
-/// most so many.
+/// The fastest structure with which a scene that is loaded, its structures being built, and a picture of so many bytes fit in
+/// `limit`, or else in what this process has and may take. Where the fast one does not fit in the latter, that is told.
 ///
 /// # Errors
-/// When the most compact one takes more.
-pub fn kind_within(limit: u64, scene: &Scene, picture: u64) -> Result<Kind> {
+/// When the most compact one does not fit.
+pub fn kind_within(limit: Option<u64>, scene: &Scene, picture: u64) -> Result<Kind> {
+    let Some(room) = limit.or_else(|| Some(available_bytes()? + resident_bytes()?)) else { return Ok(Kind::Auto) };
     let triangles: Vec<usize> = scene.meshes.iter().map(|mesh| mesh.live_count()).collect();
-    let threads = rayon::current_num_threads();
-    let others = other_bytes(scene) + picture;
-    let room = limit.checked_sub(others);
-    room.and_then(|room| Kind::within(room, &triangles, threads)).ok_or_else(|| {
-        let needed = readable(others + Kind::Compact.peak_bytes(triangles, threads));
-        let limit = readable(limit);
-        Error::limit(format!(
-            "the scene takes about {needed} with the most compact structure, more than the {limit} of --memory-limit"
-        ))
-        .remedy("raise the limit, or take a smaller model or picture")
+    let structures = room.checked_sub(other_bytes(scene) + picture);
+    let kind = structures.and_then(|room| Kind::within(room, &triangles, rayon::current_num_threads()));
+    let [wide, compact] = [Kind::Wide, Kind::Compact].map(|kind| readable(needed_bytes(scene, kind) + picture));
+    let (room, whose) = (readable(room), whose(limit));
+    if limit.is_none() && kind == Some(Kind::Compact) {
+        let note =
+            format!("note: the compact structure is built, in {compact}: the fastest takes {wide}, and {whose} {room}");
+        terminal::report(&note);
+    }
+    kind.ok_or_else(|| {
+        let error = format!("the scene takes about {compact} with the most compact structure, and {whose} {room}");
+        Error::limit(error).remedy(if limit.is_some() {
+            "raise the limit, or take a smaller model or picture"
+        } else {
+            "take a smaller model or picture; with --memory-limit or --accelerator compact it is tried all the same"
+        })
     })
+}
+
+fn whose(limit: Option<u64>) -> &'static str {
+    if limit.is_some() { "--memory-limit allows" } else { "this machine has to spare" }
 }

@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::measure::reference::ReferenceRenderer;
 use crate::progress::Progress;
 use crate::render::{BuildStats, Film, RenderSettings, Renderer, Tile};
-use crate::scene::{Camera, Scene};
+use crate::scene::{Camera, Light, Scene};
 
 /// In what rays are traced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -57,6 +57,14 @@ impl AnyRenderer {
         match self {
             Self::F32(renderer) => renderer.look_through(camera),
             Self::F64(renderer) => renderer.look_through(camera),
+        }
+    }
+
+    /// Puts other lights in the place of the scene's.
+    pub fn set_lights(&mut self, lights: Vec<Light>) -> Result<()> {
+        match self {
+            Self::F32(renderer) => renderer.set_lights(lights),
+            Self::F64(renderer) => renderer.set_lights(lights),
         }
     }
 

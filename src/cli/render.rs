@@ -17,6 +17,7 @@ use crate::formats::{self, Ledger, picture};
 use crate::job::Header;
 use crate::progress::Progress;
 use crate::render::{Crop, Film, RenderSettings};
+use crate::scene::auto::Automatic;
 use crate::scene::{FilmSettings, NamedCamera, Scene};
 
 /// Renders a picture and writes all that was asked for.
@@ -65,7 +66,8 @@ pub fn run(arguments: &RenderArguments) -> Result<()> {
         check_crop(crop, &scene.film)?;
     }
     let resized = arguments.film.values.size.is_some();
-    camera::choose(&mut scene, automatic, &arguments.camera, resized)?;
+    let turns = arguments.job.turntable.is_some();
+    camera::choose(&mut scene, automatic, &arguments.camera, resized, turns)?;
     arguments.job.move_camera(&mut scene)?;
     if let Some(path) = &pictures[0].1.scene {
         formats::scene_file::save_model_scene(&scene, &arguments.input, &options, path)?;
@@ -89,7 +91,8 @@ pub fn run(arguments: &RenderArguments) -> Result<()> {
     let renderer = renderer?;
     report_time(arguments, "build", seconds.build);
 
-    let mut work = Work { arguments, ledger, settings, header, camera, renderer, seconds, terminal: &terminal };
+    let mut work =
+        Work { arguments, ledger, settings, header, camera, automatic, renderer, seconds, terminal: &terminal };
     pictures.iter().try_for_each(|(frame, outputs)| work.picture(*frame, outputs))
 }
 
@@ -102,6 +105,8 @@ struct Work<'a> {
     header: Option<Header>,
     /// The camera, and how it moves.
     camera: NamedCamera,
+    /// Whether lights follow it.
+    automatic: Automatic,
     renderer: AnyRenderer,
     seconds: Seconds,
     terminal: &'a Terminal,
@@ -110,9 +115,13 @@ struct Work<'a> {
 impl Work<'_> {
     /// Renders one picture, or a share of it, and writes all that belongs to it.
     fn picture(&mut self, frame: Option<i32>, outputs: &Outputs) -> Result<()> {
-        let Self { arguments, ledger, settings, header, camera, renderer, seconds, terminal } = self;
+        let Self { arguments, ledger, settings, header, camera, automatic, renderer, seconds, terminal } = self;
         if let Some(frame) = frame {
-            renderer.look_through(camera.in_frame(frame));
+            let camera = camera.in_frame(frame);
+            renderer.look_through(camera);
+            if automatic.lights {
+                renderer.set_lights(automatic.lights_of(&camera))?;
+            }
         }
         let share = outputs.part.as_ref().and(arguments.job.part);
         let header = header.as_ref().filter(|_| share.is_some() || arguments.job.resume);

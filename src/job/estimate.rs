@@ -46,14 +46,6 @@ pub struct Pilot {
     pub film: Film,
 }
 
-/// Tiles that were tried.
-struct Tried {
-    costs: Vec<f64>,
-    count: u32,
-    threads: usize,
-    film: Film,
-}
-
 impl Pilot {
     /// Tries tiles of the picture for about a time. The renderer keeps its film.
     ///
@@ -74,17 +66,18 @@ impl Pilot {
         renderer.set_film(FilmSettings { samples, ..film });
         let tried = first.and_then(|_| Self::try_tiles(renderer, threads, time, progress));
         renderer.set_film(film);
-        let Tried { costs, count, threads, film: picture } = tried?;
+        let mut pilot = tried?;
         let share = f64::from(film.samples) / f64::from(samples);
-        let costs = costs.into_iter().map(|cost| cost * share).collect();
-        Ok(Self { costs, tried: count, samples, threads, film: picture })
+        pilot.costs.iter_mut().for_each(|cost| *cost *= share);
+        Ok(pilot)
     }
 
-    /// Seconds of one thread for all tiles, and what was tried for that.
-    fn try_tiles(renderer: &Renderer, threads: usize, time: Duration, progress: &dyn Progress) -> Result<Tried> {
-        let tiles = Tiles::of(&renderer.scene().film, None)?;
+    /// Tries tiles of the picture that the renderer makes now.
+    fn try_tiles(renderer: &Renderer, threads: usize, time: Duration, progress: &dyn Progress) -> Result<Self> {
+        let film = renderer.scene().film;
+        let tiles = Tiles::of(&film, None)?;
         let transparent = renderer.scene().background == Background::Transparent;
-        let mut picture = Film::blank(renderer.scene().film, None, &[], transparent)?;
+        let mut picture = Film::blank(film, None, &[], transparent)?;
         let finished = Mutex::new(Vec::new());
         let (mut wall, mut used, start) = (0.0, 0, Instant::now());
         for step in 0..STEPS {
@@ -95,10 +88,10 @@ impl Pilot {
             }
             let settings = RenderSettings { threads, tiles: Some(numbers), ..RenderSettings::default() };
             let note = |tile: &Tile| finished.lock().unwrap_or_else(PoisonError::into_inner).push(tile.clone());
-            let film = renderer.render_tiles(&settings, progress, &note)?;
+            let stats = renderer.render_tiles(&settings, progress, &note)?.stats;
             progress.check()?;
-            wall += film.stats.seconds;
-            used = film.stats.threads;
+            wall += stats.seconds;
+            used = stats.threads;
             if start.elapsed() > time {
                 break;
             }
@@ -123,7 +116,7 @@ impl Pilot {
         let total: f64 = all.iter().sum();
         let correction = if total > 0.0 { mean * all.len() as f64 / total } else { 1.0 };
         let costs = all.into_iter().map(|cost| cost * correction).collect();
-        Ok(Tried { costs, count: tried, threads: used, film: picture })
+        Ok(Self { costs, tried, samples: film.samples, threads: used, film: picture })
     }
 
     /// Seconds for all tiles on so many threads, which take the next tile as soon as they are free.

@@ -1,16 +1,9 @@
 //! What tells one scene from another: the content of its files.
 
 use std::fmt;
-use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 
-use rayon::prelude::*;
-
 use crate::error::{Error, Result};
-
-/// Bytes that are read at once.
-const PIECE: usize = 1 << 20;
 
 /// A BLAKE3 hash of the names and contents of some files, whatever folder they are in.
 #[derive(Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -24,49 +17,30 @@ impl Fingerprint {
     /// # Errors
     /// The system's, with the path of a file that cannot be read.
     pub fn of_files<'a>(input: &Path, files: impl IntoIterator<Item = &'a Path>) -> Result<Self> {
-        let files: Vec<&Path> = files.into_iter().collect();
-        let mut parts = files.par_iter().map(|path| of_file(path)).collect::<Result<Vec<_>>>()?;
+        let others = files.into_iter().filter(|path| *path != input);
+        let mut parts = others.map(|path| Ok((own_name(path), content(path)?))).collect::<Result<Vec<_>>>()?;
         parts.sort_unstable();
         parts.dedup();
         let mut all = blake3::Hasher::new();
-        all.update(of_file(input)?.1.as_bytes());
+        all.update(&content(input)?);
         for (name, content) in parts {
             all.update(&(name.len() as u64).to_le_bytes());
             all.update(name.as_bytes());
-            all.update(content.as_bytes());
+            all.update(&content);
         }
         Ok(Self(*all.finalize().as_bytes()))
     }
 }
 
-/// A file's own name and the hash of its content.
-fn of_file(path: &Path) -> Result<(String, Content)> {
-    let system = |cause| Error::system(path, cause);
-    let mut file = File::open(path).map_err(system)?;
-    let mut hasher = blake3::Hasher::new();
-    let mut piece = vec![0; PIECE];
-    loop {
-        match file.read(&mut piece) {
-            Ok(0) => break,
-            Ok(count) => {
-                hasher.update_rayon(&piece[..count]);
-            }
-            Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
-            Err(error) => return Err(system(error)),
-        }
-    }
-    let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    Ok((name, Content(*hasher.finalize().as_bytes())))
+fn own_name(path: &Path) -> String {
+    path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
-/// The hash of a file's content, which has an order.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Content([u8; 32]);
-
-impl Content {
-    fn as_bytes(&self) -> &[u8] {
-        &self.0
-    }
+/// The hash of a file's content, found by all threads.
+fn content(path: &Path) -> Result<[u8; 32]> {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update_mmap_rayon(path).map_err(|cause| Error::system(path, cause))?;
+    Ok(*hasher.finalize().as_bytes())
 }
 
 impl fmt::Display for Fingerprint {

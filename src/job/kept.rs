@@ -32,10 +32,10 @@ struct Growing {
 /// What was in a file of an earlier process.
 #[derive(Debug, Default)]
 pub struct Found {
-    /// Its whole tiles, each once.
+    /// Its whole tiles, by their numbers, each once.
     pub tiles: Vec<Tile>,
-    /// Where, in bytes, each run of damaged records begins: their tiles are to be rendered again.
-    pub damaged: Vec<usize>,
+    /// Where, in bytes, the first damaged record begins: the tiles of such are to be rendered again.
+    pub damaged: Option<usize>,
 }
 
 /// Opens a file, or creates it, and locks it against other processes.
@@ -105,9 +105,7 @@ impl Kept {
         }
         // What a killed process did not finish is written over.
         file.set_len(content.end as u64).and_then(|()| file.seek(SeekFrom::End(0))).map_err(system)?;
-        let mut found = Found { tiles: content.tiles, damaged: content.damaged };
-        found.tiles.sort_by_key(|tile| tile.number);
-        found.tiles.dedup_by_key(|tile| tile.number);
+        let found = Found { tiles: content.tiles, damaged: content.damaged };
         let growing = Growing { file, synced: Instant::now(), failed: None };
         Ok((Self { path: path.to_path_buf(), key, file: Mutex::new(growing) }, found))
     }

@@ -72,12 +72,10 @@ fn read_part(path: &Path) -> Result<(Header, Share, Vec<Tile>)> {
             .remedy("finish it with `whitted render --resume`"));
     };
     let damaged = |what: String| Error::file(what).at_path(path).remedy(format!("render part {share} again"));
-    if let Some(at) = content.damaged.first() {
+    if let Some(at) = content.damaged {
         return Err(damaged(format!("part {share} is damaged: the record at byte {at} is not whole")));
     }
-    let mut tiles = content.tiles;
-    tiles.sort_by_key(|tile| tile.number);
-    tiles.dedup_by_key(|tile| tile.number);
+    let tiles = content.tiles;
     let wanted = header.wanted()?;
     if !tiles.iter().map(|tile| tile.number).eq(wanted.iter().copied()) {
         let (have, of) = (tiles.len(), wanted.len());

@@ -81,10 +81,10 @@ pub struct Content {
     pub header: Header,
     /// What its records are checked with.
     pub key: Key,
-    /// Its whole tiles, in the order of the file.
+    /// Its whole tiles, by their numbers, each once.
     pub tiles: Vec<Tile>,
-    /// Where, in bytes, each run of damaged ones begins.
-    pub damaged: Vec<usize>,
+    /// Where, in bytes, the first damaged record begins.
+    pub damaged: Option<usize>,
     /// Where the last whole record ends.
     pub end: usize,
 }
@@ -116,8 +116,10 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Content> {
     let header: Header = serde_json::from_slice(json)
         .map_err(|cause| flawed(&format!("the header of this file of tiles is not understood: {cause}")))?;
     header.check().map_err(|error| error.at_path(path))?;
-    let mut content = Content { header, key, tiles: Vec::new(), damaged: Vec::new(), end: end + 32 };
+    let mut content = Content { header, key, tiles: Vec::new(), damaged: None, end: end + 32 };
     content.read_records(bytes)?;
+    content.tiles.sort_by_key(|tile| tile.number);
+    content.tiles.dedup_by_key(|tile| tile.number);
     Ok(content)
 }
 
@@ -130,7 +132,7 @@ impl Content {
                 (at, self.end) = (end, end);
                 continue;
             }
-            self.damaged.push(at);
+            self.damaged.get_or_insert(at);
             // The next whole record, wherever it begins.
             let mut next = at + 1;
             at = loop {

@@ -33,7 +33,7 @@ use crate::render::shadow::Illumination;
 use crate::render::world::World;
 use crate::render::{BuildStats, Film, RenderSettings, Tile};
 use crate::scene::camera::ViewRay;
-use crate::scene::{Camera, Scene, Shape};
+use crate::scene::{Camera, Light, Scene, Shape};
 
 /// A scene that is rendered in f64 with exact hits.
 pub struct ReferenceRenderer {
@@ -76,6 +76,16 @@ impl ReferenceRenderer {
     /// Puts another camera in the place of the active one.
     pub fn look_through(&mut self, camera: Camera) {
         self.scene.cameras[self.scene.active_camera].camera = camera;
+        self.world.see(&self.scene);
+    }
+
+    /// Puts other lights in the place of the scene's.
+    ///
+    /// # Errors
+    /// A light without direction.
+    pub fn set_lights(&mut self, lights: Vec<Light>) -> Result<()> {
+        self.scene.lights = lights;
+        self.world.light(&self.scene)
     }
 
     /// Renders the scene through its active camera, as [`Renderer::render`](crate::render::Renderer::render) does.

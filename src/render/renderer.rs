@@ -13,7 +13,7 @@ use crate::render::ray_tracing::ray_tracing;
 use crate::render::settings::RenderSettings;
 use crate::render::tiles::Tile;
 use crate::render::world::World;
-use crate::scene::{Camera, FilmSettings, Scene};
+use crate::scene::{Camera, FilmSettings, Light, Scene};
 
 /// A scene with its acceleration structures.
 pub struct Renderer {
@@ -136,11 +136,22 @@ impl Renderer {
     /// Renders other pictures from now on.
     pub fn set_film(&mut self, film: FilmSettings) {
         self.scene.film = film;
+        with_structure!(&mut self.intersect, structure => structure.world.see(&self.scene));
     }
 
     /// Puts another camera in the place of the active one.
     pub fn look_through(&mut self, camera: Camera) {
         self.scene.cameras[self.scene.active_camera].camera = camera;
+        with_structure!(&mut self.intersect, structure => structure.world.see(&self.scene));
+    }
+
+    /// Puts other lights in the place of the scene's.
+    ///
+    /// # Errors
+    /// A light without direction.
+    pub fn set_lights(&mut self, lights: Vec<Light>) -> Result<()> {
+        self.scene.lights = lights;
+        with_structure!(&mut self.intersect, structure => structure.world.light(&self.scene))
     }
 
     /// The objects as rays meet them.

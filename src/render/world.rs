@@ -151,6 +151,23 @@ impl World {
     }
 }
 
+impl World {
+    /// Takes the scene's camera and film as they are now.
+    pub fn see(&mut self, scene: &Scene) {
+        self.pixels = pixels(scene);
+    }
+
+    /// Takes the scene's lights as they are now.
+    ///
+    /// # Errors
+    /// A light without direction.
+    pub fn light(&mut self, scene: &Scene) -> Result<()> {
+        self.lights =
+            scene.lights.iter().map(|light| PreparedLight::new(light, scene.origin)).collect::<Result<_>>()?;
+        Ok(())
+    }
+}
+
 /// How large the pixels of the active camera are; its flaws are told where rays are made.
 fn pixels(scene: &Scene) -> Pixels {
     let Some(named) = scene.cameras.get(scene.active_camera) else { return Pixels::NONE };

@@ -46,7 +46,7 @@ impl View {
 const ISO_ELEVATION: f64 = 35.264_389_682_754_654;
 
 /// From where a bare model is seen: a little from the right and above, degrees.
-const DEFAULT_ANGLES: (f64, f64) = (30.0, 18.0);
+pub const DEFAULT_ANGLES: (f64, f64) = (30.0, 18.0);
 
 /// Vertical field of view of the automatic camera, degrees: that of a portrait lens.
 pub const DEFAULT_FOV: f64 = 35.0;
@@ -82,10 +82,15 @@ impl Automatic {
     /// Replaces the lights by a key, a fill and a rim light for the active camera; in a room that is open on one side,
     /// by a lamp under the ceiling and a fill light at the camera.
     pub fn light_from_camera(&self, scene: &mut Scene) {
-        scene.lights = match &self.room {
-            Some(room) => room.lights(scene.camera()),
-            None => studio_lights(scene.camera()),
-        };
+        scene.lights = self.lights_of(scene.camera());
+    }
+
+    /// The lights for a camera.
+    pub fn lights_of(&self, camera: &Camera) -> Vec<Light> {
+        match &self.room {
+            Some(room) => room.lights(camera),
+            None => studio_lights(camera),
+        }
     }
 }
 
@@ -167,6 +172,40 @@ pub fn frame(scene: &Scene, azimuth: f64, elevation: f64, fov_y: f64) -> Camera 
     Camera::LookAt { eye, target, up, projection: Projection::Perspective { fov_y } }
 }
 
+/// A camera that looks at the axis of a turntable from a direction, and sees the whole scene on every way around it.
+///
+/// As [`frame`], for the circles about the upward axis, through the middle of the scene's box, that its vertices turn on: each may touch a side
+/// of the picture somewhere on its way.
+pub fn frame_turning(scene: &Scene, azimuth: f64, elevation: f64, fov_y: f64) -> Camera {
+    let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    outline::visit(scene, |p| (min, max) = (min.min(p), max.max(p)));
+    let middle = if min.cmple(max).all() { (min + max) * 0.5 } else { DVec3::ZERO };
+    let ((sin_a, cos_a), (sin_e, cos_e)) = (libm::sincos(azimuth), libm::sincos(elevation));
+    let aspect = f64::from(scene.film.width) / f64::from(scene.film.height);
+    let slope_y = libm::tan(0.5 * fov_y) * (1.0 - 2.0 * MARGIN);
+    let slope_x = slope_y * aspect;
+    // What bounds the eye for a point, as in `frame`, at its largest on the point's way around.
+    let (mut beside, mut above, mut below, mut nearest) = (slope_x, f64::NEG_INFINITY, f64::NEG_INFINITY, 0.0);
+    outline::visit(scene, |p| {
+        let (x, y, z) = (p.x - middle.x, p.y - middle.y, p.z - middle.z);
+        let radius = (x * x + z * z).sqrt();
+        let (height, depth) = (y * cos_e, y * sin_e);
+        beside = f64::max(beside, radius * (1.0 + slope_x * slope_x * cos_e * cos_e).sqrt() + slope_x * depth);
+        above = above.max(height + slope_y * depth + radius * (slope_y * cos_e - sin_e).abs());
+        below = below.max(-height + slope_y * depth + radius * (slope_y * cos_e + sin_e).abs());
+        nearest = f64::max(nearest, depth + radius * cos_e.abs());
+    });
+    let (y, distance) = (0.5 * (above - below), (beside / slope_x).max(0.5 * (above + below) / slope_y));
+    let (y, distance) = if y.is_finite() { (y, distance.max(nearest)) } else { (0.0, 1.0) };
+    let backward = DVec3::new(sin_a * cos_e, sin_e, cos_a * cos_e);
+    let upward = DVec3::new(-sin_a * sin_e, cos_e, -cos_a * sin_e);
+    let eye = middle + upward * y + backward * distance;
+    // Where the view meets the axis; straight from above it is the axis.
+    let to_axis = if cos_e.abs() > 1e-6 { distance - y * sin_e / cos_e } else { distance };
+    let up = if cos_e.abs() > 1e-6 { DVec3::Y } else { upward };
+    Camera::LookAt { eye, target: eye - backward * to_axis, up, projection: Projection::Perspective { fov_y } }
+}
+
 /// Key, fill and rim light, fixed to the camera: from the upper left, the right and behind.
 fn studio_lights(camera: &Camera) -> Vec<Light> {
     let (forward, up) = match *camera {
@@ -192,7 +231,7 @@ fn studio_lights(camera: &Camera) -> Vec<Light> {
 mod tests {
     use super::*;
     use crate::geometry::TriangleMesh;
-    use crate::scene::{Object, Shape};
+    use crate::scene::{CameraPath, Object, Shape};
     use glam::{DAffine3, Vec3};
 
     fn cube() -> Scene {
@@ -227,6 +266,32 @@ mod tests {
                     extent.max((dot(d, right) / (z * half * 16.0 / 9.0)).abs()).max((dot(d, up) / (z * half)).abs());
             }
             assert!((extent - (1.0 - 2.0 * MARGIN)).abs() < 1e-9, "{azimuth} {elevation}: {extent}");
+        }
+    }
+
+    #[test]
+    fn turning_cameras_see_everything_and_are_no_farther_than_that_needs() {
+        let scene = cube();
+        for (azimuth, elevation) in [(0.0, 0.0), (0.5, 0.3), (2.0, -0.9)] {
+            let camera = frame_turning(&scene, azimuth, elevation, 0.6);
+            let half = (0.3f64).tan();
+            let mut most = 0.0f64;
+            for step in 0..720 {
+                let turned = CameraPath::Turntable { frames: 720 }.camera(&camera, step);
+                let Camera::LookAt { eye, target, up, .. } = turned else { panic!() };
+                let forward = normalize(target - eye).unwrap();
+                let right = normalize(cross(forward, up)).unwrap();
+                let up = cross(right, forward);
+                for p in outline::sample(&scene) {
+                    let d = p - eye;
+                    let z = dot(d, forward);
+                    assert!(z > 0.0);
+                    most =
+                        most.max((dot(d, right) / (z * half * 16.0 / 9.0)).abs()).max((dot(d, up) / (z * half)).abs());
+                }
+            }
+            let tight = 1.0 - 2.0 * MARGIN;
+            assert!(most <= tight + 1e-9 && most > tight - 0.01, "{azimuth} {elevation}: {most}");
         }
     }
 
