@@ -180,12 +180,15 @@ pub fn frame_turning(scene: &Scene, azimuth: f64, elevation: f64, fov_y: f64) ->
     let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     outline::visit(scene, |p| (min, max) = (min.min(p), max.max(p)));
     let middle = if min.cmple(max).all() { (min + max) * 0.5 } else { DVec3::ZERO };
-    let ((sin_a, cos_a), (sin_e, cos_e)) = (libm::sincos(azimuth), libm::sincos(elevation));
+    // Straight from above or below, the axis would be no direction for upward.
+    let steepest = 89f64.to_radians();
+    let (sin_e, cos_e) = libm::sincos(elevation.clamp(-steepest, steepest));
+    let (sin_a, cos_a) = libm::sincos(azimuth);
     let aspect = f64::from(scene.film.width) / f64::from(scene.film.height);
     let slope_y = libm::tan(0.5 * fov_y) * (1.0 - 2.0 * MARGIN);
     let slope_x = slope_y * aspect;
     // What bounds the eye for a point, as in `frame`, at its largest on the point's way around.
-    let (mut beside, mut above, mut below, mut nearest) = (slope_x, f64::NEG_INFINITY, f64::NEG_INFINITY, 0.0);
+    let [mut beside, mut above, mut below, mut nearest] = [f64::NEG_INFINITY; 4];
     outline::visit(scene, |p| {
         let (x, y, z) = (p.x - middle.x, p.y - middle.y, p.z - middle.z);
         let radius = (x * x + z * z).sqrt();
@@ -193,17 +196,18 @@ pub fn frame_turning(scene: &Scene, azimuth: f64, elevation: f64, fov_y: f64) ->
         beside = f64::max(beside, radius * (1.0 + slope_x * slope_x * cos_e * cos_e).sqrt() + slope_x * depth);
         above = above.max(height + slope_y * depth + radius * (slope_y * cos_e - sin_e).abs());
         below = below.max(-height + slope_y * depth + radius * (slope_y * cos_e + sin_e).abs());
-        nearest = f64::max(nearest, depth + radius * cos_e.abs());
+        nearest = f64::max(nearest, depth + radius * cos_e);
     });
-    let (y, distance) = (0.5 * (above - below), (beside / slope_x).max(0.5 * (above + below) / slope_y));
-    let (y, distance) = if y.is_finite() { (y, distance.max(nearest)) } else { (0.0, 1.0) };
+    let distance = (beside / slope_x).max(0.5 * (above + below) / slope_y);
+    let y = if nearest.is_finite() { 0.5 * (above - below) } else { 0.0 };
+    // A point-like model leaves no distance at all, and none has none; stand one unit away.
+    let distance = if distance > nearest { distance } else { nearest.max(0.0) + 1.0 };
     let backward = DVec3::new(sin_a * cos_e, sin_e, cos_a * cos_e);
     let upward = DVec3::new(-sin_a * sin_e, cos_e, -cos_a * sin_e);
     let eye = middle + upward * y + backward * distance;
-    // Where the view meets the axis; straight from above it is the axis.
-    let to_axis = if cos_e.abs() > 1e-6 { distance - y * sin_e / cos_e } else { distance };
-    let up = if cos_e.abs() > 1e-6 { DVec3::Y } else { upward };
-    Camera::LookAt { eye, target: eye - backward * to_axis, up, projection: Projection::Perspective { fov_y } }
+    // Where the view meets the axis.
+    let target = eye - backward * (distance - y * sin_e / cos_e);
+    Camera::LookAt { eye, target, up: DVec3::Y, projection: Projection::Perspective { fov_y } }
 }
 
 /// Key, fill and rim light, fixed to the camera: from the upper left, the right and behind.
@@ -271,8 +275,9 @@ mod tests {
 
     #[test]
     fn turning_cameras_see_everything_and_are_no_farther_than_that_needs() {
-        let scene = cube();
-        for (azimuth, elevation) in [(0.0, 0.0), (0.5, 0.3), (2.0, -0.9)] {
+        let mut scene = cube();
+        for (size, azimuth, elevation) in [(1.0, 0.0, 0.0), (1.0, 0.5, 0.3), (0.01, 2.0, -0.9), (100.0, 1.0, 1.6)] {
+            scene.objects.iter_mut().for_each(|object| object.transform = DAffine3::from_scale(DVec3::splat(size)));
             let camera = frame_turning(&scene, azimuth, elevation, 0.6);
             let half = (0.3f64).tan();
             let mut most = 0.0f64;
