@@ -1,7 +1,7 @@
 //! Files that are either written whole or not touched.
 
 use std::fs;
-use std::io::{BufWriter, Cursor, Seek, Write};
+use std::io::{self, BufWriter, Cursor, Seek, Write};
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Fault, Result};
@@ -13,7 +13,8 @@ impl<T: Write + Seek> Sink for T {}
 /// Writes a file by `write` such that a reader never sees a part of it.
 ///
 /// The content goes to a temporary file in the same folder, which takes the place of `path` once all is there; if
-/// `write` fails, `path` stays as it was. The file gets the permissions of any newly created file. A link is followed.
+/// `write` fails, `path` stays as it was. What a process leaves that is killed meanwhile, the next one takes that writes the
+/// same file. The file gets the permissions of any newly created file. A link is followed.
 /// What is no regular file (a device, a pipe), or an open one by its number (`/dev/stdout`, `/dev/fd/3`), cannot be
 /// replaced: the finished content is appended to it.
 ///
@@ -38,8 +39,7 @@ pub fn write_atomically(path: &Path, write: impl FnOnce(&mut dyn Sink) -> Result
     let mut buffered = BufWriter::new(temporary);
     write(&mut buffered).map_err(|error| error.at_path(path))?;
     let temporary = buffered.into_inner().map_err(|failed| system(failed.into_error()))?;
-    temporary.persist(&target).map_err(|failed| system(failed.error))?;
-    Ok(())
+    temporary.persist(&target).map_err(system)
 }
 
 /// Finds out whether [`write_atomically`] could write a file, without touching it.
@@ -91,11 +91,11 @@ fn is_a_folder(path: &Path) -> Error {
 }
 
 /// Where a file really is, links followed, and a temporary file in the same folder.
-fn temporary_for(path: &Path) -> Result<(PathBuf, tempfile::NamedTempFile)> {
+fn temporary_for(path: &Path) -> Result<(PathBuf, Temporary)> {
     let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
     let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let temporary = temporary_file(folder).map_err(|cause| match cause.kind() {
-        std::io::ErrorKind::NotFound => {
+    let temporary = Temporary::create(folder, &target).map_err(|cause| match cause.kind() {
+        io::ErrorKind::NotFound => {
             Error::caller(format!("there is no folder `{}`", folder.display())).at_path(path).remedy("create it first")
         }
         _ => Error::new(Fault::System, format!("cannot create a file in `{}`: {}", folder.display(), plain(&cause)))
@@ -104,13 +104,125 @@ fn temporary_for(path: &Path) -> Result<(PathBuf, tempfile::NamedTempFile)> {
     Ok((target, temporary))
 }
 
-/// A temporary file whose permissions are those that the umask leaves of a normal file's, not the owner's alone.
-fn temporary_file(folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".whitted-").suffix(".tmp");
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    builder.tempfile_in(folder)
+/// A file that goes away unless it takes another's place.
+#[derive(Debug)]
+enum Temporary {
+    /// One whose name says what it is for, held by a lock.
+    Named(named::Held),
+    /// One of any name, where there are no such, or another process holds it.
+    Any(tempfile::NamedTempFile),
+}
+
+impl Temporary {
+    fn create(folder: &Path, target: &Path) -> io::Result<Self> {
+        if let Some(held) = named::Held::take(folder, target) {
+            return Ok(Self::Named(held));
+        }
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(".whitted-").suffix(".tmp");
+        // The permissions that the umask leaves of a normal file's, not the owner's alone.
+        #[cfg(unix)]
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+        builder.tempfile_in(folder).map(Self::Any)
+    }
+
+    /// Takes the place of a file.
+    fn persist(self, target: &Path) -> io::Result<()> {
+        match self {
+            Self::Named(held) => held.persist(target),
+            Self::Any(file) => file.persist(target).map(drop).map_err(|failed| failed.error),
+        }
+    }
+
+    fn file(&mut self) -> &mut fs::File {
+        match self {
+            Self::Named(held) => held.file(),
+            Self::Any(file) => file.as_file_mut(),
+        }
+    }
+}
+
+impl Write for Temporary {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file().write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file().flush()
+    }
+}
+
+impl Seek for Temporary {
+    fn seek(&mut self, to: io::SeekFrom) -> io::Result<u64> {
+        self.file().seek(to)
+    }
+}
+
+/// Temporary files that the next process finds by their names, should one be killed.
+mod named {
+    use std::fs::{File, OpenOptions};
+    use std::io;
+    use std::path::{Path, PathBuf};
+
+    /// A temporary file that no other process has.
+    #[derive(Debug)]
+    pub struct Held {
+        file: File,
+        /// `None` once it took its place.
+        path: Option<PathBuf>,
+    }
+
+    impl Held {
+        /// Takes the file for a target, new or left by a process that was killed. `None` where another one holds it, or it is not
+        /// a file that this process may write to.
+        #[cfg(target_os = "linux")]
+        pub fn take(folder: &Path, target: &Path) -> Option<Self> {
+            use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
+            let mut name = std::ffi::OsString::from(".whitted-");
+            name.push(target.file_name()?);
+            name.push(".tmp");
+            let path = folder.join(name);
+            // A link that someone else has put there is not followed.
+            let mut options = OpenOptions::new();
+            options.read(true).write(true).create(true).truncate(false).custom_flags(libc::O_NOFOLLOW);
+            let file = options.open(&path).ok()?;
+            file.try_lock().ok()?;
+            // Another process may have given it its place, or deleted it, before it was locked.
+            let (own, there) = (file.metadata().ok()?, std::fs::symlink_metadata(&path).ok()?);
+            let is_there = (own.dev(), own.ino()) == (there.dev(), there.ino());
+            if !(is_there && own.is_file() && own.nlink() == 1) {
+                return None;
+            }
+            // The file is ours alone from here on, and goes away with this.
+            let held = Self { file, path: Some(path) };
+            held.file.set_len(0).ok()?;
+            Some(held)
+        }
+
+        /// Elsewhere open files cannot take another's place.
+        #[cfg(not(target_os = "linux"))]
+        pub fn take(_: &Path, _: &Path) -> Option<Self> {
+            None
+        }
+
+        /// Takes the place of a file.
+        pub fn persist(mut self, target: &Path) -> io::Result<()> {
+            let path = self.path.take().expect("it takes its place once");
+            std::fs::rename(&path, target).inspect_err(|_| drop(std::fs::remove_file(&path)))
+        }
+
+        pub fn file(&mut self) -> &mut File {
+            &mut self.file
+        }
+    }
+
+    impl Drop for Held {
+        fn drop(&mut self) {
+            if let Some(path) = self.path.take() {
+                let _ = std::fs::remove_file(path);
+            }
+        }
+    }
 }
 
 /// The cause of a failed operation on a temporary file, without that file's name.
@@ -154,6 +266,43 @@ mod tests {
             .unwrap();
         assert_eq!(fs::read_to_string(&path).unwrap(), "new");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn what_a_killed_process_left_is_taken_and_what_another_holds_is_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.txt");
+        let left = folder.path().join(".whitted-a.txt.tmp");
+        let write = || {
+            write_atomically(&path, |sink| sink.write_all(b"new").map_err(|cause| Error::system(Path::new("x"), cause)))
+        };
+        let names = || {
+            let mut names: Vec<_> = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+            names.sort();
+            names
+        };
+        fs::write(&left, "longer than what is new").unwrap();
+        write().unwrap();
+        assert_eq!((fs::read_to_string(&path).unwrap().as_str(), names()), ("new", vec!["a.txt".into()]));
+        fs::write(&left, "").unwrap();
+        check_writable(&path).unwrap();
+        assert_eq!(names(), ["a.txt"]);
+        // Another process has it.
+        let other = fs::File::create(&left).unwrap();
+        other.lock().unwrap();
+        write().unwrap();
+        assert_eq!(names(), [".whitted-a.txt.tmp", "a.txt"]);
+        drop(other);
+        // Links lead elsewhere.
+        fs::remove_file(&left).unwrap();
+        fs::write(folder.path().join("b"), "other").unwrap();
+        std::os::unix::fs::symlink("b", &left).unwrap();
+        write().unwrap();
+        fs::remove_file(&left).unwrap();
+        fs::hard_link(folder.path().join("b"), &left).unwrap();
+        write().unwrap();
+        assert_eq!(fs::read_to_string(folder.path().join("b")).unwrap(), "other");
     }
 
     #[cfg(unix)]
