@@ -119,8 +119,8 @@ fn main() {
     write_hills(&mut file, SIDE).and_then(|()| file.flush()).expect("it can be written");
     let path = file.path();
     let (mesh, arrays) = (ours(path), theirs(path));
-    assert_eq!((mesh.positions, mesh.indices), (arrays.positions, arrays.indices));
-    assert_eq!((mesh.normals, mesh.uvs), (Some(arrays.normals), Some(arrays.uvs)));
+    assert_eq!((mesh.positions, mesh.indices), (arrays.positions.into(), arrays.indices.into()));
+    assert_eq!((mesh.normals, mesh.uvs), (Some(arrays.normals.into()), Some(arrays.uvs.into())));
 
     let mut times = [Vec::new(), Vec::new()];
     for _ in 0..runs() {

@@ -32,7 +32,7 @@
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`math`], [`error`], [`progress`] | arithmetic with a fixed order of sums; one error type; progress and cancellation |
+//! | [`array`], [`math`], [`error`], [`progress`] | values in memory or in a mapped file; arithmetic with a fixed order of sums; one error type; progress and cancellation |
 //! | [`geometry`] | rays, boxes, the triangle test, meshes, quadrics |
 //! | [`scene`] | plain data: cameras, lights, materials, textures, objects |
 //! | [`accel`] | structures over triangles, and the tree over instances |
@@ -43,7 +43,7 @@
 //! | `editor` | a scene edited by commands, and the window that shows it, behind the feature `editor` |
 //! | `cli` | the command line, behind the feature `cli` |
 //!
-//! Imports go one way: `math, error, progress -> geometry -> {scene, accel} -> render -> formats -> job -> measure ->
+//! Imports go one way: `array, math, error, progress -> geometry -> {scene, accel} -> render -> formats -> job -> measure ->
 //! editor -> cli`; a test reads the source and fails on a backward one. `scene` and `accel` do not know each other and meet in
 //! [`render::intersect`]. Below `editor` nothing prints, reads arguments or exits.
 //!
@@ -61,6 +61,7 @@
 //!   are solved in f64 in object space.
 
 pub mod accel;
+pub mod array;
 #[cfg(feature = "cli")]
 pub mod cli;
 #[cfg(feature = "editor")]

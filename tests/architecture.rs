@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 /// Modules in layers; a module may use those of lower layers and itself, not its neighbours.
 const LAYERS: &[&[&str]] = &[
-    &["error", "progress", "math"],
+    &["array", "error", "progress", "math"],
     &["geometry"],
     &["scene", "accel"],
     &["render"],

@@ -35,7 +35,7 @@ fn patch() -> TriangleMesh {
     let square =
         |i: u32, j: u32| [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]];
     let indices = (0..side).flat_map(|j| (0..side).flat_map(move |i| square(i, j))).collect();
-    TriangleMesh { positions, normals: Some(normals), uvs: Some(uvs), indices, ..TriangleMesh::default() }
+    TriangleMesh { positions, normals: Some(normals), uvs: Some(uvs.into()), indices, ..TriangleMesh::default() }
 }
 
 fn write_obj(folder: &Path, mesh: &TriangleMesh, mtl: &str) {

@@ -68,8 +68,8 @@ pub fn white() -> Material {
 /// A rectangle of two triangles: `corner`, `corner + across`, ..., facing `across x up`.
 pub fn rectangle(corner: Vec3, across: Vec3, up: Vec3) -> TriangleMesh {
     TriangleMesh {
-        positions: vec![corner, corner + across, corner + across + up, corner + up],
-        indices: vec![[0, 1, 2], [0, 2, 3]],
+        positions: vec![corner, corner + across, corner + across + up, corner + up].into(),
+        indices: vec![[0, 1, 2], [0, 2, 3]].into(),
         ..TriangleMesh::default()
     }
 }
@@ -94,14 +94,14 @@ pub fn cube() -> TriangleMesh {
         [1, 3, 5],
         [3, 7, 5],
     ];
-    TriangleMesh { positions: positions.collect(), indices, ..TriangleMesh::default() }
+    TriangleMesh { positions: positions.collect(), indices: indices.into(), ..TriangleMesh::default() }
 }
 
 /// A closed sphere of `rings` x `segments` quads cut into triangles, poles shared; faces outward.
 pub fn sphere_mesh(radius: f64, center: DVec3, rings: u32, segments: u32) -> TriangleMesh {
     let (points, indices) = whitted::measure::scenes::sphere_points(rings, segments);
     let positions = points.into_iter().map(|p| (p * radius + center).as_vec3()).collect();
-    TriangleMesh { positions, indices, ..TriangleMesh::default() }
+    TriangleMesh { positions, indices: indices.into(), ..TriangleMesh::default() }
 }
 
 /// Renders with the default structure and one thread.

@@ -1,6 +1,7 @@
 //! What images and vertices say at each point, against closed forms: alpha, normals, colours, smaller versions, absorption.
 
 use glam::{DAffine3, DVec2, DVec3, Vec2, Vec3, Vec4};
+use whitted::array::Array;
 use whitted::geometry::TriangleMesh;
 use whitted::measure::reference::ReferenceRenderer;
 use whitted::progress::Silent;
@@ -14,7 +15,7 @@ use crate::common::*;
 /// A square of side 2 around (0, 0, z) that faces +Z, u along x and v along y.
 fn square(z: f32) -> TriangleMesh {
     let uvs = Some(vec![Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y]);
-    TriangleMesh { uvs, ..rectangle(Vec3::new(-1.0, -1.0, z), Vec3::X * 2.0, Vec3::Y * 2.0) }
+    TriangleMesh { uvs: uvs.map(Array::from), ..rectangle(Vec3::new(-1.0, -1.0, z), Vec3::X * 2.0, Vec3::Y * 2.0) }
 }
 
 /// Adds an image of numbers, one row, nearest.
@@ -63,7 +64,7 @@ pub fn everything() -> Scene {
     for (number, detail) in details.into_iter().enumerate() {
         let colors = Some(vec![[65535, 30000, 9000, 65535], [9000, 65535, 65535, 40000], [65535; 4], [20000; 4]]);
         let mesh =
-            TriangleMesh { colors: colors.filter(|_| number != 1), normals: Some(vec![Vec3::Z; 4]), ..square(0.0) };
+            TriangleMesh { colors: colors.filter(|_| number != 1).map(Array::from), normals: Some(vec![Vec3::Z; 4].into()), ..square(0.0) };
         let turn = DAffine3::from_rotation_y(0.4 * number as f64);
         let place = DAffine3::from_translation(DVec3::new(
             0.4 * number as f64 - 0.6,
@@ -95,7 +96,7 @@ pub fn coloured_and_plain_squares(count: u32) -> Scene {
         let place =
             DAffine3::from_translation(DVec3::new(x, y, 0.0) * (2.0 / f64::from(side)) - DVec3::new(0.9, 0.9, 0.0));
         let size = DAffine3::from_scale(DVec3::splat(0.9 / f64::from(side)));
-        add_mesh(&mut scene, TriangleMesh { colors, ..square(0.0) }, place * size, white());
+        add_mesh(&mut scene, TriangleMesh { colors: colors.map(Array::from), ..square(0.0) }, place * size, white());
     }
     scene.objects.iter_mut().for_each(|object| object.material = Some(1));
     add_light(&mut scene, DVec3::new(1.0, 2.0, 9.0), Rgb::ONE);
@@ -186,7 +187,7 @@ fn normal_maps_turn_the_light() {
         let mut scene = empty_scene();
         let map = add_row(&mut scene, &texels);
         let normal = Some(NormalMap { texture: map, scale: 1.0 });
-        let mesh = TriangleMesh { normals: Some(vec![Vec3::Z; 4]), tangents, ..square(0.0) };
+        let mesh = TriangleMesh { normals: Some(vec![Vec3::Z; 4].into()), tangents: tangents.map(Array::from), ..square(0.0) };
         add_mesh(&mut scene, mesh, transform, with(Detail { normal, ..Detail::NONE }, white()));
         add_light(&mut scene, to_light * 1e6, Rgb::ONE);
         let (sin, cos) = (0.5, 3f64.sqrt() / 2.0);
@@ -219,7 +220,7 @@ fn the_scale_of_a_normal_map_is_that_of_its_slope() {
 fn vertex_colours_are_interpolated_and_multiply() {
     let mut scene = empty_scene();
     let (red, green) = ([65535, 0, 0, 65535], [0, 65535, 0, 65535]);
-    let mesh = TriangleMesh { colors: Some(vec![red, green, green, red]), ..square(0.0) };
+    let mesh = TriangleMesh { colors: Some(vec![red, green, green, red].into()), ..square(0.0) };
     add_mesh(&mut scene, mesh, DAffine3::IDENTITY, Material { diffuse: Rgb::new(0.5, 1.0, 1.0), ..black() });
     add_light(&mut scene, DVec3::new(0.0, 0.0, 1e6), Rgb::ONE);
     near(seen_at(&mut scene, -0.5), Rgb::new(0.5 * 0.75, 0.25, 0.0), 1e-5);
@@ -251,7 +252,7 @@ fn light_that_is_emitted_is_that_of_the_texel_and_the_second_coordinates() {
     let mut scene = empty_scene();
     let map = add_row(&mut scene, &[[255, 0, 0, 255], [0, 0, 255, 255]]);
     let emission = Some(TextureRef { second_uvs: true, ..map });
-    let mesh = TriangleMesh { second_uvs: Some(vec![Vec2::X, Vec2::ZERO, Vec2::Y, Vec2::ONE]), ..square(0.0) };
+    let mesh = TriangleMesh { second_uvs: Some(vec![Vec2::X, Vec2::ZERO, Vec2::Y, Vec2::ONE].into()), ..square(0.0) };
     let bright = Material { emission: Rgb::splat(0.5), ..black() };
     add_mesh(&mut scene, mesh, DAffine3::IDENTITY, with(Detail { emission, ..Detail::NONE }, bright));
     assert_eq!(seen_at(&mut scene, -0.5), Rgb::Z * 0.5, "u runs the other way");

@@ -19,6 +19,7 @@ mod box_tree;
 mod budget;
 mod bvh2;
 mod cwbvh;
+mod kept;
 mod leaf;
 mod linear;
 mod pair_tree;
@@ -34,6 +35,7 @@ pub(crate) mod wide;
 pub use box_tree::BoxTree;
 pub use bvh2::Bvh2;
 pub use cwbvh::CwBvh;
+pub use kept::{KeptTree, TreeArrays};
 pub use linear::Linear;
 pub use stats::{Tests, TreeStats};
 /// For `measure`, which compares formulas within one and the same tree.
@@ -125,6 +127,11 @@ macro_rules! define_kind {
 for_each_accelerator!(define_kind {});
 
 impl Kind {
+    /// Whether the structure can be kept in a file.
+    pub fn can_be_kept(self) -> bool {
+        dispatch_kind!(self, A => <A as TriangleAccelerator>::CAN_BE_KEPT)
+    }
+
     /// The structure itself: `Auto` becomes the one that measures fastest.
     pub fn resolve(self) -> Self {
         if self == Self::Auto { Self::Wide } else { self }
@@ -248,4 +255,22 @@ pub trait TriangleAccelerator: Sized + Send + Sync {
 
     /// The box around what rays meet of all triangles ([`TriangleMesh::hit_bounds`]), exact; empty for an empty mesh.
     fn bounds(&self) -> Bounds;
+
+    /// Whether the structure can be kept in a file.
+    const CAN_BE_KEPT: bool = false;
+
+    /// The arrays to be kept; `None` where the structure [cannot be](Self::CAN_BE_KEPT).
+    fn arrays(&self) -> Option<TreeArrays<'_>> {
+        None
+    }
+
+    /// The structure whose arrays were kept, over the same mesh. All numbers that name nodes and triangles are checked, whoever wrote
+    /// them; that boxes contain what is below them is not.
+    ///
+    /// # Errors
+    /// Says what is wrong with them.
+    fn restore(mesh: &Arc<TriangleMesh>, kept: &KeptTree) -> std::result::Result<Self, String> {
+        let _ = (mesh, kept);
+        Err(format!("the structure `{}` cannot be kept", Self::NAME))
+    }
 }

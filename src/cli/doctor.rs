@@ -185,9 +185,9 @@ mod tests {
         let uvs = vec![Vec2::ZERO, Vec2::new(2.0, 0.0), Vec2::new(0.0, 1.00005)];
         let mesh = TriangleMesh {
             name: "m".into(),
-            positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
-            indices: vec![[0, 1, 2]],
-            uvs: Some(uvs),
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y].into(),
+            indices: vec![[0, 1, 2]].into(),
+            uvs: Some(uvs.into()),
             materials: Materials::One(0),
             ..Default::default()
         };

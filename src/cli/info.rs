@@ -383,9 +383,9 @@ mod tests {
     fn scene() -> Scene {
         let mesh = TriangleMesh {
             origin: DVec3::new(100.0, 0.0, 0.0),
-            positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
-            indices: vec![[0, 1, 2], [0, 1, 1]],
-            normals: Some(vec![Vec3::Z; 3]),
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y].into(),
+            indices: vec![[0, 1, 2], [0, 1, 1]].into(),
+            normals: Some(vec![Vec3::Z; 3].into()),
             ..Default::default()
         };
         let object = |shape, transform| Object { name: String::new(), shape, transform, material: Some(0) };

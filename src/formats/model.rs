@@ -189,7 +189,7 @@ mod tests {
             material: Some(1),
         };
         let model = Model {
-            meshes: vec![mesh(Materials::One(1)), mesh(Materials::PerTriangle(vec![0, 1]))],
+            meshes: vec![mesh(Materials::One(1)), mesh(Materials::PerTriangle(vec![0, 1].into()))],
             materials: vec![Material::default(), material],
             textures: vec![texture("a")],
             objects: vec![object(1)],
@@ -203,7 +203,7 @@ mod tests {
             [(Shape::Mesh(1), Some(2)), (Shape::Mesh(3), Some(4)),]
         );
         assert_eq!(scene.meshes[2].materials, Materials::One(4));
-        assert_eq!(scene.meshes[3].materials, Materials::PerTriangle(vec![3, 4]));
+        assert_eq!(scene.meshes[3].materials, Materials::PerTriangle(vec![3, 4].into()));
         assert_eq!(scene.materials[4].diffuse_texture, Some(TextureRef::new(1)));
     }
 

@@ -7,6 +7,7 @@ use std::collections::HashMap;
 use glam::{DVec3, Vec2, Vec3, Vec4};
 use robust::{Coord, orient2d};
 
+use crate::array::Array;
 use crate::error::{Error, Result};
 use crate::geometry::bounds::Bounds;
 use crate::geometry::smoothing::angles;
@@ -28,20 +29,20 @@ pub struct TriangleMesh {
     /// their coordinates leave f32. Filled by [`finish`](Self::finish).
     pub exponent: i32,
     /// Vertex positions, relative to `origin` and divided by 2 to the `exponent`.
-    pub positions: Vec<Vec3>,
+    pub positions: Array<Vec3>,
     /// Vertex numbers, three per triangle.
-    pub indices: Vec<[u32; 3]>,
+    pub indices: Array<[u32; 3]>,
     /// Shading normals per vertex, of any length; zero means "use the face's".
-    pub normals: Option<Vec<Vec3>>,
+    pub normals: Option<Array<Vec3>>,
     /// Texture coordinates per vertex; the origin is the image's lower left corner, v goes up.
-    pub uvs: Option<Vec<Vec2>>,
+    pub uvs: Option<Array<Vec2>>,
     /// A second set of texture coordinates, for those textures that use it.
-    pub second_uvs: Option<Vec<Vec2>>,
+    pub second_uvs: Option<Array<Vec2>>,
     /// Linear colours and alpha per vertex, in fractions of 65535: they multiply a material's diffuse colour.
-    pub colors: Option<Vec<[u16; 4]>>,
+    pub colors: Option<Array<[u16; 4]>>,
     /// Tangents per vertex, for normal maps: the direction in which u grows, of any length, and in w the sign of
     /// the bitangent `w cross(normal, tangent)`, along which v grows.
-    pub tangents: Option<Vec<Vec4>>,
+    pub tangents: Option<Array<Vec4>>,
     /// Which of the scene's materials each triangle has.
     pub materials: Materials,
     /// Names of runs of triangles, ascending: each group reaches to the next one's first triangle. Empty where the file names
@@ -49,9 +50,9 @@ pub struct TriangleMesh {
     pub groups: Vec<Group>,
     /// The 0-based face of the file that each triangle was cut from, where that was asked for and faces are not
     /// triangles anyway; see [`source_face`](Self::source_face).
-    pub source_faces: Option<Vec<u32>>,
+    pub source_faces: Option<Array<u32>>,
     /// Numbers of the triangles that cannot be hit, ascending; filled by [`finish`](Self::finish).
-    pub dropped: Vec<u32>,
+    pub dropped: Array<u32>,
     /// Why they were dropped; filled by [`finish`](Self::finish).
     pub dropped_counts: DroppedCounts,
     /// What storing the file's positions in f32 cost; filled by loaders.
@@ -90,7 +91,7 @@ pub enum Materials {
     /// One for all.
     One(u32),
     /// One per triangle.
-    PerTriangle(Vec<u32>),
+    PerTriangle(Array<u32>),
 }
 
 impl Default for Materials {
@@ -141,11 +142,11 @@ impl TriangleMesh {
             Error::caller(format!("mesh `{name}` has {have} {what} for {} positions", self.positions.len()))
         };
         let counts = [
-            ("normals", self.normals.as_ref().map(Vec::len)),
-            ("texture coordinates", self.uvs.as_ref().map(Vec::len)),
-            ("second texture coordinates", self.second_uvs.as_ref().map(Vec::len)),
-            ("colours", self.colors.as_ref().map(Vec::len)),
-            ("tangents", self.tangents.as_ref().map(Vec::len)),
+            ("normals", self.normals.as_ref().map(|values| values.len())),
+            ("texture coordinates", self.uvs.as_ref().map(|values| values.len())),
+            ("second texture coordinates", self.second_uvs.as_ref().map(|values| values.len())),
+            ("colours", self.colors.as_ref().map(|values| values.len())),
+            ("tangents", self.tangents.as_ref().map(|values| values.len())),
         ];
         for (what, count) in counts {
             if let Some(count) = count.filter(|&count| count != self.positions.len()) {
@@ -181,7 +182,7 @@ impl TriangleMesh {
             *reason += 1;
             dropped.push(number as u32);
         }
-        self.dropped = dropped;
+        self.dropped = dropped.into();
         self.dropped_counts = counts;
         Ok(self)
     }
@@ -287,7 +288,7 @@ impl TriangleMesh {
     /// # Errors
     /// A limit where there are 4294967295 already.
     pub(crate) fn copy_vertex(&mut self, vertex: u32) -> Result<u32> {
-        fn copy<T: Copy>(values: Option<&mut Vec<T>>, at: usize) {
+        fn copy<T: Copy>(values: Option<&mut Array<T>>, at: usize) {
             if let Some(values) = values {
                 values.extend(values.get(at).copied());
             }
@@ -361,8 +362,8 @@ mod tests {
                 Vec3::new(2.0, 0.0, 0.0),
                 Vec3::new(f32::NAN, 0.0, 0.0),
                 Vec3::new(3e38, 0.0, 0.0),
-            ],
-            indices: vec![[0, 1, 3], [0, 1, 2], [0, 0, 1], [4, 1, 2], [5, 1, 2], [0, 1, 9], [2, 1, 0]],
+            ].into(),
+            indices: vec![[0, 1, 3], [0, 1, 2], [0, 0, 1], [4, 1, 2], [5, 1, 2], [0, 1, 9], [2, 1, 0]].into(),
             ..Default::default()
         };
         let mesh = mesh.finish().unwrap();
@@ -376,7 +377,7 @@ mod tests {
     fn huge_and_tiny_meshes_are_scaled_by_a_power_of_two() {
         for size in [1e13f32, 1.8e18, 1e30, 1e-13, 1e-25] {
             let positions = vec![Vec3::ZERO, Vec3::X * size, Vec3::new(0.3, 0.7, 0.1) * size];
-            let mesh = TriangleMesh { positions: positions.clone(), indices: vec![[0, 1, 2]], ..Default::default() };
+            let mesh = TriangleMesh { positions: positions.clone().into(), indices: vec![[0, 1, 2]].into(), ..Default::default() };
             let mesh = mesh.finish().unwrap();
             assert_eq!(mesh.live_count(), 1, "{size:e}");
             assert!((0.5..=2.0).contains(&mesh.positions[1].x), "{size:e}");
@@ -387,7 +388,7 @@ mod tests {
         // One vertex far out leaves the others alone; it is dropped where f32 could not answer for it.
         for (far, live) in [(3e38, 1), (1.8e18, 2), (FARTHEST_COORDINATE, 2), (FARTHEST_COORDINATE.next_up(), 1)] {
             let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::splat(far)];
-            let mesh = TriangleMesh { positions, indices: vec![[0, 1, 2], [0, 1, 3]], ..Default::default() };
+            let mesh = TriangleMesh { positions: positions.into(), indices: vec![[0, 1, 2], [0, 1, 3]].into(), ..Default::default() };
             let mesh = mesh.finish().unwrap();
             assert_eq!((mesh.exponent, mesh.live_count()), (0, live), "{far:e}");
             assert_eq!(mesh.dropped_counts.non_finite, 2 - live as u64, "{far:e}");
@@ -406,7 +407,7 @@ mod tests {
 
     #[test]
     fn mismatched_attributes_are_refused() {
-        let mesh = TriangleMesh { positions: vec![Vec3::ZERO; 3], normals: Some(vec![]), ..Default::default() };
+        let mesh = TriangleMesh { positions: vec![Vec3::ZERO; 3].into(), normals: Some(vec![].into()), ..Default::default() };
         assert!(mesh.finish().is_err());
     }
 }

@@ -87,7 +87,7 @@ impl TriangleMesh {
         // The fan that a vertex belongs to, and the copies that belong to others.
         let mut own = vec![UNCLAIMED; vertices];
         let mut copies: HashMap<(u32, u32), u32> = HashMap::new();
-        self.normals.get_or_insert_with(|| vec![Vec3::ZERO; vertices]);
+        self.normals.get_or_insert_with(|| vec![Vec3::ZERO; vertices].into());
         for number in 0..self.indices.len() {
             let triangle = self.indices[number];
             if !is_whole(&triangle) {

@@ -188,7 +188,7 @@ mod tests {
                 let along_u = normalize(DVec3::new(d, -c, 0.0) / determinant).unwrap();
                 let expected = along_u.as_vec3().extend(determinant.signum() as f32);
                 assert_eq!(mesh.positions.len(), 16, "nothing is split");
-                mesh.tangents.unwrap().into_iter().for_each(|found| assert_near(found, expected, 1e-6));
+                mesh.tangents.unwrap().iter().for_each(|&found| assert_near(found, expected, 1e-6));
             }
         }
     }
@@ -232,11 +232,11 @@ mod tests {
     #[test]
     fn only_triangles_that_want_tangents_have_them_and_bad_ones_are_passed_over() {
         let mut mesh = TriangleMesh {
-            positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z, Vec3::NAN],
-            uvs: Some(vec![Vec2::ZERO, Vec2::X, Vec2::Y, Vec2::ONE, Vec2::ONE]),
-            colors: Some(vec![[7; 4]; 5]),
-            indices: vec![[0, 1, 2], [0, 1, 3], [0, 1, 9], [0, 1, 4], [2, 2, 1]],
-            materials: Materials::PerTriangle(vec![1, 0, 1, 1, 1]),
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z, Vec3::NAN].into(),
+            uvs: Some(vec![Vec2::ZERO, Vec2::X, Vec2::Y, Vec2::ONE, Vec2::ONE].into()),
+            colors: Some(vec![[7; 4]; 5].into()),
+            indices: vec![[0, 1, 2], [0, 1, 3], [0, 1, 9], [0, 1, 4], [2, 2, 1]].into(),
+            materials: Materials::PerTriangle(vec![1, 0, 1, 1, 1].into()),
             ..Default::default()
         };
         let plain = mesh.clone();

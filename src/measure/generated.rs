@@ -116,7 +116,7 @@ fn hairball(hairs: u32, segments: u32, sides: u32) -> TriangleMesh {
             along = normalize(along + random.direction() * CURL).unwrap_or(along);
         }
     }
-    TriangleMesh { positions, indices, ..TriangleMesh::default() }
+    TriangleMesh { positions: positions.into(), indices: indices.into(), ..TriangleMesh::default() }
 }
 
 #[cfg(test)]

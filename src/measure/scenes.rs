@@ -41,7 +41,7 @@ pub fn mirror(share: f32, emission: f32) -> Material {
 pub fn mesh_at(positions: &[DVec3], indices: Vec<[u32; 3]>) -> Result<TriangleMesh> {
     let origin = choose_origin(positions.iter().copied());
     let positions = positions.iter().map(|&p| (p - origin).as_vec3()).collect();
-    TriangleMesh { origin, positions, indices, ..TriangleMesh::default() }.finish()
+    TriangleMesh { origin, positions, indices: indices.into(), ..TriangleMesh::default() }.finish()
 }
 
 /// Adds a finished mesh with a material of its own; gives its instance number.

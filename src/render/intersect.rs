@@ -7,8 +7,10 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use crate::accel::{self, BoxTree, Counting, Kind, Params, Tests, TreeStats, TriangleAccelerator};
-use crate::error::Result;
+use crate::accel::{
+    self, BoxTree, Counting, KeptTree, Kind, Params, Tests, TreeArrays, TreeStats, TriangleAccelerator,
+};
+use crate::error::{Error, Result};
 use crate::geometry::ray::Interval;
 use crate::geometry::{Bounds, Hit, Key, PreparedRay, Quadric, Ray, TriangleMesh};
 use crate::progress::Progress;
@@ -74,6 +76,16 @@ pub struct TwoLevel<A> {
     pub(super) top: Top,
 }
 
+/// What need not be built of a scene's structures.
+pub enum Ready<'a, A> {
+    /// Everything is to be built.
+    Nothing,
+    /// The trees of meshes that another state of the scene shares.
+    State(&'a Scene, &'a TwoLevel<A>),
+    /// The trees of all meshes, in a file.
+    Kept(&'a [KeptTree]),
+}
+
 /// How instances are found.
 pub(super) enum Top {
     /// The scene is one untransformed mesh.
@@ -116,20 +128,62 @@ impl Filter for Transmissive {
     }
 }
 
+/// The trees of a scene's meshes that a file has.
+fn restore<A: TriangleAccelerator>(scene: &Scene, trees: &[KeptTree], progress: &dyn Progress) -> Result<Vec<Arc<A>>> {
+    if trees.len() != scene.meshes.len() {
+        return Err(Error::file(format!("there are {} trees for {} meshes", trees.len(), scene.meshes.len())));
+    }
+    let restore = |(mesh, kept): (&Arc<TriangleMesh>, &KeptTree)| {
+        progress.check()?;
+        let tree = A::restore(mesh, kept)
+            .map_err(|what| Error::file(format!("the tree of mesh `{}` is damaged: {what}", mesh.name)))?;
+        progress.advance(mesh.live_count() as u64);
+        Ok(Arc::new(tree))
+    };
+    scene.meshes.par_iter().zip(trees).map(restore).collect()
+}
+
 impl<A: TriangleAccelerator> TwoLevel<A> {
-    /// Builds the trees of all meshes and the top level, but for those of meshes that another state of the scene shares, which
-    /// have been built `before`. Advances by one step a live triangle.
+    /// Builds the trees of all meshes that are not `ready`, and the top level. Advances by one step a live triangle.
     ///
     /// # Errors
-    /// A singular transform, or a cancellation.
+    /// A singular transform; a cancellation; trees that are no trees of the scene's meshes.
     pub fn build(
+        scene: &Scene,
+        ready: &Ready<'_, A>,
+        params: &Params,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        let (world, meshes) = match *ready {
+            Ready::Nothing => (World::new(scene)?, Self::build_meshes(scene, None, params, progress)?),
+            Ready::State(other, structure) => {
+                (World::new(scene)?, Self::build_meshes(scene, Some((other, structure)), params, progress)?)
+            }
+            Ready::Kept(trees) => {
+                let meshes = restore(scene, trees, progress)?;
+                let bounds: Vec<Bounds> = meshes.iter().map(|mesh: &Arc<A>| mesh.bounds()).collect();
+                (World::with_bounds(scene, &bounds)?, meshes)
+            }
+        };
+        let instances = &world.instances;
+        let single = matches!(instances.as_slice(), [one] if one.identity && one.shape == Shape::Mesh(0));
+        let top = if single {
+            Top::Single
+        } else if params.kind.resolve() == Kind::Linear {
+            Top::Linear
+        } else {
+            let unbounded = (0..instances.len() as u32).filter(|&i| instances[i as usize].bounds.is_none()).collect();
+            Top::Tree { tree: BoxTree::build(&boxes(instances), params, progress)?, unbounded }
+        };
+        Ok(Self { meshes, quadrics: scene.quadrics.clone(), world, top })
+    }
+
+    fn build_meshes(
         scene: &Scene,
         before: Option<(&Scene, &Self)>,
         params: &Params,
         progress: &dyn Progress,
-    ) -> Result<Self> {
-        let world = World::new(scene)?;
-        let instances = &world.instances;
+    ) -> Result<Vec<Arc<A>>> {
         let address = |mesh: &Arc<TriangleMesh>| Arc::as_ptr(mesh) as usize;
         let known: HashMap<usize, &Arc<A>> = before.map_or_else(HashMap::new, |(scene, structure)| {
             scene.meshes.iter().map(address).zip(&structure.meshes).collect()
@@ -146,17 +200,12 @@ impl<A: TriangleAccelerator> TwoLevel<A> {
         let small = scene.meshes.par_iter().map(|mesh| is_small(mesh).then(|| build(mesh)).transpose());
         let small = small.collect::<Result<Vec<_>>>()?;
         let meshes = scene.meshes.iter().zip(small).map(|(mesh, built)| built.map_or_else(|| build(mesh), Ok));
-        let meshes = meshes.collect::<Result<Vec<_>>>()?;
-        let single = matches!(instances.as_slice(), [one] if one.identity && one.shape == Shape::Mesh(0));
-        let top = if single {
-            Top::Single
-        } else if params.kind.resolve() == Kind::Linear {
-            Top::Linear
-        } else {
-            let unbounded = (0..instances.len() as u32).filter(|&i| instances[i as usize].bounds.is_none()).collect();
-            Top::Tree { tree: BoxTree::build(&boxes(instances), params, progress)?, unbounded }
-        };
-        Ok(Self { meshes, quadrics: scene.quadrics.clone(), world, top })
+        meshes.collect()
+    }
+
+    /// The arrays of the meshes' trees; `None` where they cannot be kept.
+    pub fn arrays(&self) -> Option<Vec<TreeArrays<'_>>> {
+        self.meshes.iter().map(|mesh| mesh.arrays()).collect()
     }
 
     /// The objects as rays meet them.
@@ -460,7 +509,7 @@ mod tests {
                 })
                 .collect();
             let indices = (0..count as u32).map(|n| [3 * n, 3 * n + 1, 3 * n + 2]).collect();
-            TriangleMesh { positions, indices, ..TriangleMesh::default() }.finish().unwrap().into()
+            TriangleMesh { positions: positions.into(), indices, ..TriangleMesh::default() }.finish().unwrap().into()
         };
         let meshes: Vec<_> = [50_000, 10, 40_000, 1, 40_000, 300, 60_000].into_iter().map(&mut confetti).collect();
         let object = |mesh: u32| Object {

@@ -305,7 +305,7 @@ mod tests {
             _ => random.direction().as_vec3(),
         });
         let normals = Some(normals.collect());
-        TriangleMesh { positions, indices, normals, ..TriangleMesh::default() }.finish().unwrap()
+        TriangleMesh { positions: positions.into(), indices, normals, ..TriangleMesh::default() }.finish().unwrap()
     }
 
     #[test]

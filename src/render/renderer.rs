@@ -2,13 +2,13 @@
 
 use std::time::Instant;
 
-use crate::accel::{Bvh2, Compact, CwBvh, Linear, Params, Tests, Wide};
+use crate::accel::{Bvh2, Compact, CwBvh, KeptTree, Kind, Linear, Params, Tests, TreeArrays, Wide};
 use crate::error::Result;
 use crate::geometry::{Hit, Key, Ray};
 use crate::progress::Progress;
 use crate::render::explain::{self, Explanation, Samples};
 use crate::render::film::Film;
-use crate::render::intersect::{Intersect, TwoLevel};
+use crate::render::intersect::{Intersect, Ready, TwoLevel};
 use crate::render::ray_tracing::ray_tracing;
 use crate::render::settings::RenderSettings;
 use crate::render::tiles::Tile;
@@ -43,6 +43,16 @@ pub struct BuildStats {
     pub max_depth: u32,
 }
 
+/// What there is already of a scene's structures.
+#[derive(Clone, Copy)]
+enum Before<'a> {
+    Nothing,
+    /// Those of another state of the scene.
+    State(&'a Scene, &'a AnyTwoLevel),
+    /// The trees of all meshes, in a file.
+    Kept(&'a [KeptTree]),
+}
+
 macro_rules! any_two_level {
     ({} $($name:ident $text:literal $description:literal;)+) => {
         /// A two-level structure over any kind of accelerator; the kind is matched once a call.
@@ -51,20 +61,16 @@ macro_rules! any_two_level {
         }
 
         impl AnyTwoLevel {
-            /// Trees that `before` has of the same meshes, of its scene, are shared.
-            fn build(
-                scene: &Scene,
-                before: Option<(&Scene, &Self)>,
-                params: &Params,
-                progress: &dyn Progress,
-            ) -> Result<Self> {
+            /// Builds what is not there before.
+            fn build(scene: &Scene, before: Before<'_>, params: &Params, progress: &dyn Progress) -> Result<Self> {
                 match params.kind.resolve() {
                     $(crate::accel::Kind::$name => {
-                        let known = match before {
-                            Some((scene, Self::$name(structure))) => Some((scene, structure)),
-                            _ => None,
+                        let ready = match before {
+                            Before::State(scene, Self::$name(structure)) => Ready::State(scene, structure),
+                            Before::Kept(trees) => Ready::Kept(trees),
+                            _ => Ready::Nothing,
                         };
-                        Ok(Self::$name(TwoLevel::build(scene, known, params, progress)?))
+                        Ok(Self::$name(TwoLevel::build(scene, &ready, params, progress)?))
                     })+
                     crate::accel::Kind::Auto => unreachable!("resolve never returns Auto"),
                 }
@@ -89,7 +95,7 @@ impl Renderer {
     /// # Errors
     /// A singular transform, a light without direction, a material that makes light, or a cancellation.
     pub fn build(scene: Scene, params: &Params, progress: &dyn Progress) -> Result<Self> {
-        Self::build_on(scene, None, params, progress)
+        Self::build_on(scene, Before::Nothing, params, progress)
     }
 
     /// [`build`](Self::build) for a scene that is another state of this one's: trees of meshes that both share are not built
@@ -98,12 +104,26 @@ impl Renderer {
     /// # Errors
     /// As `build`.
     pub fn rebuild(&self, scene: Scene, params: &Params, progress: &dyn Progress) -> Result<Self> {
-        Self::build_on(scene, Some((&self.scene, &self.intersect)), params, progress)
+        Self::build_on(scene, Before::State(&self.scene, &self.intersect), params, progress)
+    }
+
+    /// A scene whose meshes' trees were kept, one each, and are of this kind; the rest is built.
+    ///
+    /// # Errors
+    /// As [`build`](Self::build); a file's error where numbers in trees name what there is not.
+    pub fn restore(scene: Scene, kind: Kind, trees: &[KeptTree], progress: &dyn Progress) -> Result<Self> {
+        let params = Params { kind, ..Params::default() };
+        Self::build_on(scene, Before::Kept(trees), &params, progress)
+    }
+
+    /// The arrays of the trees of the scene's meshes, to be kept; `None` where their kind [cannot be](Kind::can_be_kept).
+    pub fn arrays(&self) -> Option<Vec<TreeArrays<'_>>> {
+        with_structure!(&self.intersect, structure => structure.arrays())
     }
 
     fn build_on(
         scene: Scene,
-        before: Option<(&Scene, &AnyTwoLevel)>,
+        before: Before<'_>,
         params: &Params,
         progress: &dyn Progress,
     ) -> Result<Self> {

@@ -96,6 +96,15 @@ impl World {
     /// Names the object whose transform is singular or not finite, the quadric whose material has detail, the material that returns more light than it
     /// receives, or the light without direction.
     pub fn new(scene: &Scene) -> Result<Self> {
+        let bounds: Vec<Bounds> = scene.meshes.iter().map(|mesh| mesh.hit_bounds()).collect();
+        Self::with_bounds(scene, &bounds)
+    }
+
+    /// [`new`](Self::new) where the boxes around what rays meet of meshes are known.
+    ///
+    /// # Errors
+    /// As `new`.
+    pub fn with_bounds(scene: &Scene, mesh_bounds: &[Bounds]) -> Result<Self> {
         // Weights that were computed may exceed 1 by rounding.
         const MOST: f32 = 1.0 + 4.0 * f32::EPSILON;
         // NaN is not at most anything.
@@ -104,7 +113,6 @@ impl World {
             let message = format!("material `{}`: kr + kt is more than 1 and would make light", material.name);
             return Err(Error::caller(message));
         }
-        let mesh_bounds: Vec<Bounds> = scene.meshes.iter().map(|mesh| mesh.hit_bounds()).collect();
         let materials: Vec<Traits> = scene.materials.iter().map(Traits::of).collect();
         let mesh_traits: Vec<Traits> = scene.meshes.iter().map(|mesh| Traits::of_mesh(mesh, &materials)).collect();
         // What a quadric without a material of its own has.

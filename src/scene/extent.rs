@@ -84,8 +84,8 @@ mod tests {
     fn scene() -> Scene {
         let mesh = TriangleMesh {
             origin: DVec3::X * 1000.0,
-            positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
-            indices: vec![[0, 1, 2]],
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y].into(),
+            indices: vec![[0, 1, 2]].into(),
             ..Default::default()
         };
         Scene {

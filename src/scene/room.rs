@@ -95,7 +95,7 @@ mod tests {
         let positions = crate::geometry::Bounds { min: Vec3::splat(-1.0), max: Vec3::ONE }.corners().to_vec();
         let sides = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4]];
         let indices = sides.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-        let mut mesh = TriangleMesh { positions, indices, ..Default::default() }.finish().unwrap();
+        let mut mesh = TriangleMesh { positions: positions.into(), indices, ..Default::default() }.finish().unwrap();
         let object =
             Object { name: String::new(), shape: Shape::Mesh(0), transform: glam::DAffine3::IDENTITY, material: None };
         let scene = |mesh: &TriangleMesh| Scene {

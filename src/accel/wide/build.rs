@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::Tree;
 use super::chunks::{Chunk, Chunks, Reference};
 use super::collapse::Collapse;
-use super::leaf::Leaves;
+use super::leaf::GrowingLeaves;
 use super::node::{Child, Node};
 use super::simd::prefer_huge_pages;
 use crate::accel::Preset;
@@ -34,7 +34,7 @@ pub fn build(
     let mut references = Reference::all(mesh);
     let Chunks { bounds, top, chunks } = Chunks::cut(&mut references);
     progress.check()?;
-    let leaves = |triangles: usize| Leaves::with_capacity(triangles, compact.then(|| mesh.clone()));
+    let leaves = |triangles: usize| GrowingLeaves::with_capacity(triangles, compact.then(|| mesh.clone()));
     let assembly = Mutex::new(Assembly::new(top, leaves(mesh.live_count()), mesh.live_count()));
     let next = AtomicUsize::new(0);
     let work = || -> Result<()> {
@@ -58,7 +58,7 @@ pub fn build(
 /// A chunk's nodes and leaves, numbered from 0.
 struct Built {
     nodes: Vec<Node>,
-    leaves: Leaves,
+    leaves: GrowingLeaves,
     root: Child,
 }
 
@@ -66,7 +66,7 @@ impl Built {
     fn new(
         mesh: &TriangleMesh,
         chunk: &Chunk<'_>,
-        leaves: Leaves,
+        leaves: GrowingLeaves,
         preset: Preset,
         progress: &dyn Progress,
     ) -> Result<Self> {
@@ -85,7 +85,7 @@ impl Built {
 /// The tree as far as it is built.
 struct Assembly {
     nodes: Vec<Node>,
-    leaves: Leaves,
+    leaves: GrowingLeaves,
     root: Child,
     /// The chunk that comes next.
     next: usize,
@@ -98,7 +98,7 @@ impl Assembly {
     const TRIANGLES_A_NODE: usize = 16;
 
     /// With the top and room for the leaves of all chunks.
-    fn new(top: Vec<Node>, leaves: Leaves, triangles: usize) -> Self {
+    fn new(top: Vec<Node>, leaves: GrowingLeaves, triangles: usize) -> Self {
         let root = if top.is_empty() { Child::NONE } else { Child::inner(0) };
         let mut nodes = top;
         nodes.reserve(triangles.div_ceil(Self::TRIANGLES_A_NODE));
@@ -130,7 +130,6 @@ impl Assembly {
         let mut nodes = Vec::with_capacity(self.nodes.len());
         prefer_huge_pages(&mut nodes);
         nodes.append(&mut self.nodes);
-        self.leaves.finish();
-        Tree::new(nodes, self.leaves, self.root)
+        Tree::new(nodes.into(), self.leaves.finish(), self.root)
     }
 }

@@ -5,7 +5,7 @@
 //! `cost(n, i)` is the least expected cost of what is below binary node n if at most i places of a wide node are spent on
 //! it. One deviation: deep ends of degenerate trees are cut in eight equal parts instead, so that the depth is bounded.
 
-use super::leaf::Leaves;
+use super::leaf::GrowingLeaves;
 use super::node::{Child, Node, WIDTH};
 use crate::accel::leaf::LeafTriangle;
 use crate::accel::topology::{self, Topology, half_area};
@@ -38,12 +38,12 @@ pub struct Collapse<'a> {
     /// The finished nodes, the root first.
     pub nodes: Vec<Node>,
     /// The finished leaves.
-    pub leaves: Leaves,
+    pub leaves: GrowingLeaves,
 }
 
 impl<'a> Collapse<'a> {
     /// Finds the costs. The topology must have leaves of one triangle; the wide tree's will go to `leaves`, which are empty.
-    pub fn new(topology: &'a Topology, triangles: &'a [LeafTriangle], leaves: Leaves) -> Self {
+    pub fn new(topology: &'a Topology, triangles: &'a [LeafTriangle], leaves: GrowingLeaves) -> Self {
         let source = topology.nodes.as_slice();
         let mut costs = vec![[0.0; WIDTH - 1]; source.len()];
         let mut ranges = vec![(0, 0); source.len()];

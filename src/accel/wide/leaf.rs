@@ -15,15 +15,24 @@ use glam::Vec3;
 use super::node::{Child, TRIANGLE_WORDS, WIDTH};
 use super::simd::prefer_huge_pages;
 use crate::accel::leaf::LeafTriangle;
+use crate::array::Array;
 use crate::geometry::TriangleMesh;
 
 /// All leaves' triangles.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Leaves {
     /// [`TRIANGLE_WORDS`] a triangle, or one; and some so that a vector may be loaded from the last run.
-    words: Vec<u32>,
+    words: Array<u32>,
     triangles: usize,
     /// Where compact leaves have their triangles from.
+    mesh: Option<Arc<TriangleMesh>>,
+}
+
+/// Leaves that are being made, which have no room behind the last run yet.
+#[derive(Debug, Default)]
+pub struct GrowingLeaves {
+    words: Vec<u32>,
+    triangles: usize,
     mesh: Option<Arc<TriangleMesh>>,
 }
 
@@ -32,17 +41,13 @@ pub type Room = MaybeUninit<[u32; ROOM]>;
 
 const ROOM: usize = (TRIANGLE_WORDS + 1) * WIDTH;
 
-impl Leaves {
+impl GrowingLeaves {
     /// Without triangles, with room for some; compact if there is a mesh.
     pub fn with_capacity(triangles: usize, mesh: Option<Arc<TriangleMesh>>) -> Self {
         let mut leaves = Self { mesh, ..Self::default() };
-        leaves.words.reserve_exact(triangles * leaves.triangle_words() + WIDTH);
+        leaves.words.reserve_exact(triangles * triangle_words(leaves.mesh.is_some()) + WIDTH);
         prefer_huge_pages(&mut leaves.words);
         leaves
-    }
-
-    fn triangle_words(&self) -> usize {
-        if self.mesh.is_some() { 1 } else { TRIANGLE_WORDS }
     }
 
     /// Adds a leaf and returns the place of its first triangle.
@@ -66,26 +71,51 @@ impl Leaves {
         self.triangles += other.triangles;
     }
 
+    /// The number of triangles.
+    pub fn len(&self) -> usize {
+        self.triangles
+    }
+
     /// Ends the last leaf with what vectors loaded from it may hold beyond its end.
-    pub fn finish(&mut self) {
+    pub fn finish(mut self) -> Leaves {
         self.words.extend([0; WIDTH]);
+        Leaves { words: self.words.into(), triangles: self.triangles, mesh: self.mesh }
+    }
+}
+
+/// Words of a triangle.
+fn triangle_words(is_compact: bool) -> usize {
+    if is_compact { 1 } else { TRIANGLE_WORDS }
+}
+
+impl Leaves {
+    /// Those whose words have been kept: of a mesh's compact leaves if there is one. `None` where they are not whole triangles and the
+    /// room behind the last.
+    pub fn kept(words: Array<u32>, mesh: Option<Arc<TriangleMesh>>) -> Option<Self> {
+        let of_triangles = words.len().checked_sub(WIDTH)?;
+        let each = triangle_words(mesh.is_some());
+        let triangles = of_triangles / each;
+        (triangles * each == of_triangles && triangles <= Child::MOST).then_some(Self { words, triangles, mesh })
+    }
+
+    fn triangle_words(&self) -> usize {
+        triangle_words(self.mesh.is_some())
     }
 
     /// All words.
-    #[cfg(test)]
     pub fn words(&self) -> &[u32] {
         &self.words
     }
 
     /// Bytes of all leaves, without the mesh that compact ones share.
     pub fn bytes(&self) -> usize {
-        size_of_val(self.words.as_slice())
+        self.words.bytes()
     }
 
     /// Bytes that searches read: those of the mesh too.
     pub fn bytes_read(&self) -> usize {
         let arrays =
-            |mesh: &TriangleMesh| size_of_val(mesh.positions.as_slice()) + size_of_val(mesh.indices.as_slice());
+            |mesh: &TriangleMesh| mesh.positions.bytes() + mesh.indices.bytes();
         self.bytes() + self.mesh.as_deref().map_or(0, arrays)
     }
 
@@ -108,6 +138,12 @@ impl Leaves {
             None => self.words.as_ptr().wrapping_add(leaf.first() * TRIANGLE_WORDS).cast(),
             Some(mesh) => lay_out(mesh, &self.words[leaf.first()..][..leaf.count()], room).as_ptr().cast(),
         }
+    }
+
+    /// The numbers of a leaf's triangles in the mesh.
+    pub fn primitives(&self, leaf: Child) -> &[u32] {
+        let each = self.triangle_words();
+        &self.words[leaf.first() * each..][..leaf.count() * each][leaf.count() * (each - 1)..]
     }
 
     /// The triangles of a leaf.

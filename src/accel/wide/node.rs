@@ -12,7 +12,7 @@ pub const TRIANGLE_WORDS: usize = 10;
 
 /// A node or a leaf, in 32 bits: an inner node's number, or [`Child::LEAF`], the number of triangles less 1 in the three bits
 /// below, and the place of the first triangle among all.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(transparent)]
 pub struct Child(pub u32);
 
@@ -74,19 +74,21 @@ impl Child {
 
 /// A node: eight boxes as arrays of planes, ready to be loaded into vectors. 256 bytes: four cache lines, and a number becomes
 /// an address by a shift.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C, align(256))]
 pub struct Node {
     /// `planes[axis][side][child]`; side 0 is the lower plane. Where there is no child the box is empty.
     pub planes: [[[f32; WIDTH]; 2]; 3],
     /// What is in the boxes.
     pub children: [Child; WIDTH],
+    /// Fills the last cache line.
+    pub unused: [u32; 8],
 }
 
 impl Node {
     /// Without children.
     pub const EMPTY: Self =
-        Self { planes: [[[f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]]; 3], children: [Child::NONE; WIDTH] };
+        Self { planes: [[[f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]]; 3], children: [Child::NONE; WIDTH], unused: [0; 8] };
 
     /// Sets a child.
     pub fn set(&mut self, at: usize, bounds: &Bounds, child: Child) {

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use super::collapse::Collapse;
+use super::leaf::GrowingLeaves;
 use super::*;
 use crate::accel::leaf::LeafTriangle;
 use crate::accel::topology::Topology;
@@ -18,7 +19,7 @@ use crate::progress::Silent;
 fn soup(triangles: impl IntoIterator<Item = [Vec3; 3]>) -> Arc<TriangleMesh> {
     let positions: Vec<Vec3> = triangles.into_iter().flatten().collect();
     let indices = (0..positions.len() as u32 / 3).map(|n| [3 * n, 3 * n + 1, 3 * n + 2]).collect();
-    TriangleMesh { positions, indices, ..TriangleMesh::default() }.finish().unwrap().into()
+    TriangleMesh { positions: positions.into(), indices, ..TriangleMesh::default() }.finish().unwrap().into()
 }
 
 fn confetti(count: usize, size: f64, random: &mut Random) -> Arc<TriangleMesh> {
@@ -209,10 +210,9 @@ fn deep_ends_are_cut_evenly() {
     }
     let topology = Topology { nodes, order: (0..count as u32).collect() };
     let triangles: Vec<_> = live.iter().map(|&number| LeafTriangle::new(&mesh, number)).collect();
-    let mut collapse = Collapse::new(&topology, &triangles, Leaves::default());
+    let mut collapse = Collapse::new(&topology, &triangles, GrowingLeaves::default());
     let root = collapse.run(0);
-    collapse.leaves.finish();
-    let tree = Tree::new(collapse.nodes, collapse.leaves, root);
+    let tree = Tree::new(collapse.nodes.into(), collapse.leaves.finish(), root);
     let wide = Wide { tree, bounds: topology.nodes[0].bounds, level: Level::chosen() };
     assert_eq!(wide.validate(), Ok(()));
     assert!(wide.stats().max_depth > 30 && wide.stats().max_depth as usize <= MOST_DEPTH);

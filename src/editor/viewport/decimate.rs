@@ -225,7 +225,7 @@ mod tests {
         assert_eq!(closed(&mesh), (true, true));
         mesh.indices.iter_mut().for_each(|triangle| triangle.swap(0, 1));
         assert_eq!(closed(&mesh), (true, true));
-        mesh.indices.truncate(mesh.indices.len() / 2);
+        mesh.indices.update(|indices| indices.truncate(indices.len() / 2));
         assert!(!closed(&mesh).0);
     }
 }

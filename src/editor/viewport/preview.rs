@@ -6,6 +6,7 @@ use std::sync::{Arc, OnceLock};
 
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 
+use crate::array::Array;
 use crate::editor::viewport::decimate::decimate;
 use crate::editor::viewport::piece::{Piece, Source};
 use crate::editor::viewport::tessellate::{Extent, Fineness, Tessellation, tessellate};
@@ -341,7 +342,7 @@ impl Source for MeshSource<'_> {
 
     fn uv(&self, vertex: u32) -> Option<[f32; 4]> {
         let (first, second) = (self.mesh.uvs.as_ref(), self.mesh.second_uvs.as_ref());
-        let at = |uvs: Option<&Vec<glam::Vec2>>| uvs.map_or([0.0; 2], |uvs| uvs[vertex as usize].to_array());
+        let at = |uvs: Option<&Array<glam::Vec2>>| uvs.map_or([0.0; 2], |uvs| uvs[vertex as usize].to_array());
         let ([u, v], [s, t]) = (at(first), at(second));
         (first.is_some() || second.is_some()).then_some([u, v, s, t])
     }

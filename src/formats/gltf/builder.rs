@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use glam::{DVec3, Vec2, Vec3, Vec4};
 
+use crate::array::Array;
 use crate::error::Result;
 use crate::formats::{NormalMode, Treatment, rounding};
 use crate::geometry::TriangleMesh;
@@ -48,10 +49,10 @@ impl<T: Copy> Attribute<T> {
         &mut self.values
     }
 
-    fn finish(mut self, vertices: usize) -> Option<Vec<T>> {
+    fn finish(mut self, vertices: usize) -> Option<Array<T>> {
         (!self.values.is_empty()).then(|| {
             self.values.resize(vertices, self.absent);
-            self.values
+            self.values.into()
         })
     }
 }
@@ -93,8 +94,8 @@ impl Builder {
         let mut mesh = TriangleMesh {
             name,
             origin,
-            positions,
-            indices,
+            positions: positions.into(),
+            indices: indices.into(),
             normals: self.normals.finish(vertices),
             uvs,
             second_uvs,
@@ -128,7 +129,7 @@ fn materials(runs: &[(u32, usize)], triangles: usize) -> Materials {
             for &(material, end) in runs {
                 each.resize(end, material);
             }
-            Materials::PerTriangle(each)
+            Materials::PerTriangle(each.into())
         }
     }
 }

@@ -8,6 +8,7 @@ use glam::{DVec3, Vec3};
 use super::colors;
 use super::parse::{ABSENT, Parsed};
 use super::triangulate::Triangulator;
+use crate::array::Array;
 use crate::error::Result;
 use crate::formats::{Ledger, LoadOptions, NormalMode, Treatment, rounding};
 use crate::geometry::TriangleMesh;
@@ -43,12 +44,12 @@ pub(super) fn build(
     let (names, materials) = materials(&parsed);
     let groups = parsed.names.groups(parsed.faces.corner_counts());
     let smoothing = smoothing_runs(&parsed);
-    let source_faces = options.faces.then(|| source_faces(&parsed));
+    let source_faces = options.faces.then(|| source_faces(&parsed).into());
     let indices = cut(&mut parsed, progress)?;
     let mesh = TriangleMesh {
         name: name.to_owned(),
         origin,
-        indices,
+        indices: indices.into(),
         materials,
         groups,
         source_faces,
@@ -116,17 +117,17 @@ fn point(parsed: &Parsed, vertex: u32) -> DVec3 {
 fn with_vertices(parsed: Parsed, origin: DVec3, ledger: &mut Ledger) -> TriangleMesh {
     let Parsed { positions, colors, uvs, normals, faces, .. } = parsed;
     let relative = |position: &DVec3| (*position - origin).as_vec3();
-    let colors = colors::linear(colors, ledger);
+    let colors = colors::linear(colors, ledger).map(Array::from);
     let Some(vertices) = faces.vertices() else {
         let positions = positions.iter().map(relative).collect();
         return TriangleMesh { positions, colors, ..Default::default() };
     };
     drop(vertices);
     let each = || faces.vertices().into_iter().flatten();
-    let mut mesh = TriangleMesh::default();
-    mesh.positions.reserve_exact(each().count());
-    mesh.positions.extend(each().map(|[position, ..]| positions.get(position as usize).map_or(Vec3::NAN, relative)));
+    let mut places = Vec::with_capacity(each().count());
+    places.extend(each().map(|[position, ..]| positions.get(position as usize).map_or(Vec3::NAN, relative)));
     drop(positions);
+    let mut mesh = TriangleMesh { positions: places.into(), ..TriangleMesh::default() };
     if each().any(|[_, uv, _]| uv != ABSENT) {
         mesh.uvs = Some(each().map(|[_, uv, _]| uvs.get(uv as usize).copied().unwrap_or_default()).collect());
     }
@@ -222,5 +223,5 @@ fn materials(parsed: &Parsed) -> (Vec<Option<String>>, Materials) {
     for (slot, corners) in of_faces.zip(parsed.faces.corner_counts()) {
         of_triangles.extend(repeat_n(slot, corners - 2));
     }
-    (names, Materials::PerTriangle(of_triangles))
+    (names, Materials::PerTriangle(of_triangles.into()))
 }

@@ -59,7 +59,7 @@ fn triangles_keep_the_order_of_the_file_across_materials_and_count_bad_ones() {
     let mesh = &model.meshes[0];
     let names: Vec<_> = model.materials.iter().map(|material| material.name.as_str()).collect();
     assert_eq!(names, ["default", "a", "b"]);
-    assert_eq!(mesh.materials, Materials::PerTriangle(vec![0, 1, 1, 2, 2, 1]));
+    assert_eq!(mesh.materials, Materials::PerTriangle(vec![0, 1, 1, 2, 2, 1].into()));
     assert_eq!(mesh.dropped, [3, 4]);
     assert_eq!((mesh.dropped_counts.bad_index, mesh.dropped_counts.zero_area), (1, 1));
     assert_eq!(
@@ -120,7 +120,7 @@ fn source_faces_are_kept_when_asked_for() {
         let model = load_files(&[("a.obj", &text)], &LoadOptions { faces, ..Default::default() }).unwrap();
         model.meshes[0].source_faces.clone()
     };
-    assert_eq!(faces(true), Some(vec![0, 0, 2, 2, 2, 3]));
+    assert_eq!(faces(true), Some([0, 0, 2, 2, 2, 3].into()));
     assert_eq!(faces(false), None);
 }
 

@@ -22,7 +22,7 @@ fn split_cube() -> TriangleMesh {
     let corners: Vec<[Vec3; 3]> = cube.indices.iter().map(corner).collect();
     let normal = |[a, b, c]: [Vec3; 3]| (b - a).cross(c - a);
     TriangleMesh {
-        positions: corners.as_flattened().to_vec(),
+        positions: corners.as_flattened().to_vec().into(),
         indices: (0..12).map(|number| [3 * number, 3 * number + 1, 3 * number + 2]).collect(),
         normals: Some(corners.iter().flat_map(|&corners| [normal(corners); 3]).collect()),
         ..Default::default()
@@ -88,7 +88,7 @@ fn a_triangle_turned_round_has_three_edges_of_wrong_winding() {
 #[test]
 fn a_hole_has_open_edges_with_their_places() {
     let mut mesh = cube();
-    mesh.indices.remove(11);
+    mesh.indices.update(|indices| indices.remove(11));
     // The triangle was 1, 7, 5.
     let places = [(2, 5), (4, 1), (10, 7)].map(|(triangle, vertex)| (Some(triangle), Some(vertex))).to_vec();
     assert_eq!(found(mesh), [(Flaw::OpenEdge, 3, places)]);
@@ -108,7 +108,7 @@ fn a_fin_is_not_manifold_and_open() {
 fn unused_vertices_are_counted_and_only_a_few_are_named() {
     expect(|mesh| mesh.positions.push(Vec3::ONE), Flaw::UnreferencedVertex, None, Some(8));
     let mut mesh = cube();
-    mesh.positions.resize(108, Vec3::ZERO);
+    mesh.positions.update(|positions| positions.resize(108, Vec3::ZERO));
     let places = (8..13).map(|vertex| (None, Some(vertex))).collect();
     assert_eq!(found(mesh), [(Flaw::UnreferencedVertex, 100, places)]);
 }
@@ -145,7 +145,7 @@ fn a_flat_triangle_beside_a_t_junction_closes_it() {
     // A square cut into two, with a vertex in the middle of one side that only a flat triangle uses on the other.
     let positions = vec![Vec3::ZERO, Vec3::X * 2.0, Vec3::new(2.0, 2.0, 0.0), Vec3::X, Vec3::new(1.0, -1.0, 0.0)];
     let indices = vec![[0, 1, 2], [3, 1, 0], [0, 3, 4], [3, 4, 1]];
-    let mesh = TriangleMesh { positions, indices, ..Default::default() };
+    let mesh = TriangleMesh { positions: positions.into(), indices: indices.into(), ..Default::default() };
     let open = found(mesh).into_iter().find(|(flaw, ..)| *flaw == Flaw::OpenEdge).unwrap().1;
     // Around: 1-2, 2-0, 0-4, 4-1; the edges along the x axis are shared with the flat triangle.
     assert_eq!(open, 4);

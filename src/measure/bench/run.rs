@@ -19,7 +19,7 @@ use crate::measure::speed::{interleaved, millions_per_second};
 use crate::measure::statistics::Median;
 use crate::progress::Progress;
 use crate::render::Renderer;
-use crate::render::intersect::TwoLevel;
+use crate::render::intersect::{Ready, TwoLevel};
 
 /// Rays that a thread takes at once where there are several threads.
 const PIECE: usize = 4096;
@@ -69,7 +69,7 @@ impl Reference {
         let loose = match kind {
             ReferenceKind::Bvh2 => None,
             // Every instance is asked.
-            ReferenceKind::Loose => Some(TwoLevel::build(&scene, None, &params(Kind::Linear), progress)?),
+            ReferenceKind::Loose => Some(TwoLevel::build(&scene, &Ready::Nothing, &params(Kind::Linear), progress)?),
         };
         let linear = build(scene.clone(), Kind::Linear)?;
         Ok(Self { linear, loose, renderer: build(scene, Kind::Bvh2)?, checked_a_set: 1 })

@@ -318,14 +318,14 @@ fn world_boxes(context: &Context<'_>) -> Result<Outcome> {
         let to_world = any_transform(random, number);
         let mut scene = scenes::empty();
         let corners: Vec<Vec3> = match number % 3 {
-            0 => meshes::square().positions,
+            0 => meshes::square().positions.into_vec(),
             1 => (0..4).map(|_| random.in_cube().as_vec3()).collect(),
             _ => shapes::sphere().bounds().map_or(vec![], |bounds| bounds.corners().to_vec()),
         };
         if number % 3 == 2 {
             scenes::add_quadric(&mut scene, shapes::sphere(), to_world, scenes::white());
         } else {
-            let mesh = meshes::mesh(corners.clone(), vec![[0, 1, 2], [0, 2, 3]]);
+            let mesh = meshes::mesh(corners.clone().into(), vec![[0, 1, 2], [0, 2, 3]].into());
             if mesh.live_count() < 2 {
                 return;
             }

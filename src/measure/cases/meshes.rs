@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
+use crate::array::Array;
 use crate::geometry::TriangleMesh;
 use crate::math::vector::normalize;
 use crate::measure::scenes::sphere_points;
@@ -27,14 +28,14 @@ pub fn scene(meshes: Vec<TriangleMesh>) -> Scene {
 }
 
 /// A finished mesh of vertices and triangles.
-pub fn mesh(positions: Vec<Vec3>, indices: Vec<[u32; 3]>) -> TriangleMesh {
+pub fn mesh(positions: Array<Vec3>, indices: Array<[u32; 3]>) -> TriangleMesh {
     let mesh = TriangleMesh { positions, indices, ..TriangleMesh::default() };
     mesh.finish().expect("test meshes are small and have no attributes")
 }
 
 /// A mesh of triangles that share no vertices.
 pub fn soup(triangles: impl IntoIterator<Item = [Vec3; 3]>) -> TriangleMesh {
-    let positions: Vec<Vec3> = triangles.into_iter().flatten().collect();
+    let positions: Array<Vec3> = triangles.into_iter().flatten().collect();
     let indices = (0..positions.len() as u32 / 3).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
     mesh(positions, indices)
 }
@@ -48,7 +49,7 @@ pub fn moved(of: &TriangleMesh, to: impl Fn(Vec3) -> Vec3) -> TriangleMesh {
 /// outward. Vertices are computed in f64 and rounded once.
 pub fn sphere(rings: u32, segments: u32, radius: f64, center: DVec3) -> TriangleMesh {
     let (points, indices) = sphere_points(rings, segments);
-    mesh(points.into_iter().map(|out| (center + out * radius).as_vec3()).collect(), indices)
+    mesh(points.into_iter().map(|out| (center + out * radius).as_vec3()).collect(), indices.into())
 }
 
 /// An icosahedron whose faces were quartered `level` times and its vertices put on the sphere; 20 * 4^level triangles,
@@ -95,7 +96,7 @@ pub fn icosphere(level: u32, radius: f64, center: DVec3) -> TriangleMesh {
         }
         faces = quarters;
     }
-    mesh(directions.iter().map(|&d| (center + d * radius).as_vec3()).collect(), faces)
+    mesh(directions.iter().map(|&d| (center + d * radius).as_vec3()).collect(), faces.into())
 }
 
 fn unit(v: DVec3) -> DVec3 {
@@ -114,12 +115,12 @@ pub fn grid(n: u32) -> TriangleMesh {
             indices.extend([[a, b, c], [a, c, d]]);
         }
     }
-    mesh(positions, indices)
+    mesh(positions, indices.into())
 }
 
 /// The unit square of two triangles, [0, 1]^2 in the plane z = 0, facing +z.
 pub fn square() -> TriangleMesh {
-    mesh(vec![Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y], vec![[0, 1, 2], [0, 2, 3]])
+    mesh(vec![Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y].into(), vec![[0, 1, 2], [0, 2, 3]].into())
 }
 
 /// The cube [0, 1]^3 of twelve triangles, faces outward.

@@ -50,7 +50,7 @@ fn mirrors(made: Made, placed: DAffine3, material: &Material) -> Result<Scene> {
                 [(-60.0, -60.0), (60.0, -60.0), (60.0, 60.0), (-60.0, 60.0)].map(|(y, z)| Vec3::new(x, y, z * side))
             };
             let positions = wall(0.0, 1.0).into_iter().chain(wall(1.0, -1.0)).collect();
-            let mesh = meshes::mesh(positions, vec![[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]]);
+            let mesh = meshes::mesh(positions, vec![[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]].into());
             scenes::add_mesh(&mut scene, mesh, placed, material.clone());
         }
         Made::Planes => {

@@ -72,7 +72,7 @@ fn split_square(context: &Context<'_>) -> Result<Outcome> {
             let at = |x: f32, y: f32| turn.apply(Vec3::new(x, y, 0.0));
             let corners = [(x - half, 0.0), (x, 0.0), (x + half, 0.0), (x - half, 1.0), (x, 1.0), (x + half, 1.0)];
             let positions = corners.map(|(x, y)| at(x, y)).to_vec();
-            let mesh = meshes::mesh(positions, vec![[0, 1, 3], [1, 4, 3], [1, 2, 4], [2, 5, 4]]);
+            let mesh = meshes::mesh(positions.into(), vec![[0, 1, 3], [1, 4, 3], [1, 2, 4], [2, 5, 4]].into());
             let scene = meshes::scene(vec![mesh]);
             for structure in context.structures(&scene) {
                 let structure = structure?;

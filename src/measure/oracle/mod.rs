@@ -29,6 +29,7 @@ use std::cmp::Ordering;
 
 use glam::{DAffine3, DVec3, Vec3};
 
+use crate::array::Array;
 use crate::error::{Error, Result};
 use crate::geometry::Hit;
 use crate::measure::dyadic::Dyadic;
@@ -86,7 +87,7 @@ struct PlacedMesh {
 /// Answers exactly for one scene, of which it keeps the geometry.
 pub struct Oracle {
     /// Vertices and triangles of the scene's meshes.
-    meshes: Vec<(Vec<Vec3>, Vec<[u32; 3]>)>,
+    meshes: Vec<(Array<Vec3>, Array<[u32; 3]>)>,
     /// By instance number; `None` is a quadric.
     placed: Vec<Option<PlacedMesh>>,
     quadrics: Vec<(u32, PlacedQuadric)>,

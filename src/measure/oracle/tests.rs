@@ -18,7 +18,7 @@ fn scene(meshes: Vec<(TriangleMesh, DAffine3)>) -> Scene {
 }
 
 fn mesh(positions: Vec<Vec3>, indices: Vec<[u32; 3]>) -> TriangleMesh {
-    TriangleMesh { positions, indices, ..TriangleMesh::default() }
+    TriangleMesh { positions: positions.into(), indices: indices.into(), ..TriangleMesh::default() }
 }
 
 /// The cube [0, 2]^3: triangles 2 k and 2 k + 1 lie on the lower (k = 0, 1, 2) and upper (3, 4, 5) sides of the axes.

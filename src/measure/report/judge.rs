@@ -249,7 +249,7 @@ mod tests {
         let behind = [[0.0, 0.0, 2.0], [1.0, 0.0, 2.0], [0.0, 1.0, 2.0]];
         let positions = square.into_iter().chain(behind).map(Vec3::from).collect();
         let mesh =
-            TriangleMesh { positions, indices: vec![[0, 1, 2], [0, 2, 3], [4, 5, 6]], ..TriangleMesh::default() };
+            TriangleMesh { positions, indices: vec![[0, 1, 2], [0, 2, 3], [4, 5, 6]].into(), ..TriangleMesh::default() };
         of_mesh(mesh.finish().unwrap())
     }
 
@@ -303,7 +303,7 @@ mod tests {
         let ends = [[0.0, -1.0, 1.0], [0.0, 1.0, 1.0], [2.0, -1.0, 2.0], [2.0, 1.0, 2.0]].map(Vec3::from);
         let positions = edge.into_iter().chain(ends).collect();
         let indices = vec![[0, 1, 4], [1, 5, 4], [0, 2, 1], [1, 2, 3], [2, 6, 3], [3, 6, 7]];
-        let mesh = TriangleMesh { positions, indices, ..TriangleMesh::default() };
+        let mesh = TriangleMesh { positions, indices: indices.into(), ..TriangleMesh::default() };
         let scene = of_mesh(mesh.finish().unwrap());
         let oracle = Oracle::new(&scene).unwrap();
         let judge = Judge::new(&scene.meshes[0], &oracle);
@@ -331,7 +331,7 @@ mod tests {
         }
         let quad = |i: u32| [[i, i + 1, i + 3], [i, i + 3, i + 2]];
         let indices = [0, 2, 4, 6].into_iter().flat_map(quad).collect();
-        let mesh = TriangleMesh { positions, indices, ..TriangleMesh::default() };
+        let mesh = TriangleMesh { positions: positions.into(), indices, ..TriangleMesh::default() };
         let scene = of_mesh(mesh.finish().unwrap());
         let oracle = Oracle::new(&scene).unwrap();
         let judge = Judge::new(&scene.meshes[0], &oracle);

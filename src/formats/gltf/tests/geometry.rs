@@ -75,7 +75,7 @@ fn interleaved_and_normalised_attributes_are_read_in_place() {
         load_json(&file.json(rest.clone()), &options).unwrap().meshes.remove(0).normals
     };
     assert_eq!(normals(NormalMode::Flat), None);
-    assert_eq!(normals(NormalMode::Smooth), Some(vec![Vec3::Z; 3]));
+    assert_eq!(normals(NormalMode::Smooth), Some([Vec3::Z; 3].into()));
 
     // One byte too far is an error that names the accessor.
     file.accessors[2]["count"] = json!(4);
@@ -123,7 +123,7 @@ fn primitives_of_a_mesh_are_joined_in_order() {
         ]}]}))
         .unwrap();
     let mesh = &model.meshes[0];
-    assert_eq!(mesh.materials, Materials::PerTriangle(vec![1, 1, 2]));
+    assert_eq!(mesh.materials, Materials::PerTriangle(vec![1, 1, 2].into()));
     assert_eq!((mesh.dropped.as_slice(), mesh.dropped_counts.bad_index), ([1u32].as_slice(), 1));
     assert_eq!(mesh.triangle(2)[0], Vec3::Z * 9.0);
     let normals = mesh.normals.as_ref().unwrap();
