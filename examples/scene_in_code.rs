@@ -26,7 +26,13 @@ fn checker() -> Texture {
 /// One triangle, counter-clockwise seen from the camera.
 fn triangle() -> whitted::Result<TriangleMesh> {
     let positions = vec![Vec3::new(-2.6, 0.0, -0.6), Vec3::new(-0.6, 0.0, -1.4), Vec3::new(-1.7, 2.2, -1.2)];
-    TriangleMesh { name: "triangle".into(), positions, indices: vec![[0, 1, 2]], ..TriangleMesh::default() }.finish()
+    TriangleMesh {
+        name: "triangle".into(),
+        positions: positions.into(),
+        indices: [[0, 1, 2]].into(),
+        ..TriangleMesh::default()
+    }
+    .finish()
 }
 
 fn scene() -> whitted::Result<Scene> {

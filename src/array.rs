@@ -244,13 +244,16 @@ mod tests {
         let mut longer = mapped.clone();
         longer.extend([5, 6]);
         drop(mapping);
-        assert_eq!((changed, longer, mapped.into_vec()), (vec![2, 9, 4].into(), vec![2, 3, 4, 5, 6].into(), vec![2, 3, 4]));
+        assert_eq!(
+            (changed, longer, mapped.into_vec()),
+            (vec![2, 9, 4].into(), vec![2, 3, 4, 5, 6].into(), vec![2, 3, 4])
+        );
     }
 
     #[test]
     fn values_begin_where_they_may_and_are_whole() {
         let mapping = mapping(&[0; 64]);
-        for range in [1..9, 0..6, 60..68, 80..84, 8..4] {
+        for range in [1..9, 0..6, 60..68, 80..84] {
             assert!(Array::<u32>::mapped(&mapping, range.clone()).is_none(), "{range:?}");
         }
         assert_eq!(Array::<u32>::mapped(&mapping, 64..64).unwrap().len(), 0);

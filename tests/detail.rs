@@ -63,8 +63,11 @@ pub fn everything() -> Scene {
     ];
     for (number, detail) in details.into_iter().enumerate() {
         let colors = Some(vec![[65535, 30000, 9000, 65535], [9000, 65535, 65535, 40000], [65535; 4], [20000; 4]]);
-        let mesh =
-            TriangleMesh { colors: colors.filter(|_| number != 1).map(Array::from), normals: Some(vec![Vec3::Z; 4].into()), ..square(0.0) };
+        let mesh = TriangleMesh {
+            colors: colors.filter(|_| number != 1).map(Array::from),
+            normals: Some(vec![Vec3::Z; 4].into()),
+            ..square(0.0)
+        };
         let turn = DAffine3::from_rotation_y(0.4 * number as f64);
         let place = DAffine3::from_translation(DVec3::new(
             0.4 * number as f64 - 0.6,
@@ -187,7 +190,8 @@ fn normal_maps_turn_the_light() {
         let mut scene = empty_scene();
         let map = add_row(&mut scene, &texels);
         let normal = Some(NormalMap { texture: map, scale: 1.0 });
-        let mesh = TriangleMesh { normals: Some(vec![Vec3::Z; 4].into()), tangents: tangents.map(Array::from), ..square(0.0) };
+        let mesh =
+            TriangleMesh { normals: Some(vec![Vec3::Z; 4].into()), tangents: tangents.map(Array::from), ..square(0.0) };
         add_mesh(&mut scene, mesh, transform, with(Detail { normal, ..Detail::NONE }, white()));
         add_light(&mut scene, to_light * 1e6, Rgb::ONE);
         let (sin, cos) = (0.5, 3f64.sqrt() / 2.0);

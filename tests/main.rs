@@ -5,6 +5,7 @@ mod architecture;
 mod batches;
 mod bench;
 mod both_formats;
+mod built;
 mod command_line;
 mod common;
 mod detail;

@@ -27,8 +27,11 @@ impl Question {
     /// The triangles placed by a transform; rays stay.
     fn placed_renderer(&self, transform: DAffine3, params: &Params) -> Renderer {
         let mut scene: Scene = empty_scene();
-        let mesh =
-            TriangleMesh { positions: self.positions.clone().into(), indices: self.indices.clone().into(), ..Default::default() };
+        let mesh = TriangleMesh {
+            positions: self.positions.clone().into(),
+            indices: self.indices.clone().into(),
+            ..Default::default()
+        };
         add_mesh(&mut scene, mesh, transform, white());
         Renderer::build(scene, params, &Silent).unwrap()
     }

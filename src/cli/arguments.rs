@@ -6,6 +6,7 @@ use clap::{Args, Parser, Subcommand, ValueHint};
 use clap_complete::Shell;
 
 use super::bench::BenchArguments;
+use super::build::BuildSceneArguments;
 use super::check::CheckArguments;
 use super::diff::DiffArguments;
 use super::edit::EditArguments;
@@ -40,8 +41,10 @@ pub struct Arguments {
 /// What to do.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Render a scene file (.toml) or a model (.obj, .gltf, .glb) to a picture.
+    /// Render a scene file (.toml), a model (.obj, .gltf, .glb) or a built scene (.whb) to a picture.
     Render(Box<RenderArguments>),
+    /// Keep a scene with its trees in a file (.whb) that later commands need not read and build.
+    Build(Box<BuildSceneArguments>),
     /// Make one picture of the parts that several processes or machines rendered.
     Merge(MergeArguments),
     /// Tell what a scene or model holds and needs, without rendering it.
@@ -70,7 +73,7 @@ pub enum Command {
 /// Flags of `render`.
 #[derive(Debug, Args)]
 pub struct RenderArguments {
-    /// Scene file or model.
+    /// Scene file, model or built scene.
     #[arg(value_hint = ValueHint::FilePath)]
     pub input: PathBuf,
 

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueHint};
 
+use super::build::open_scene;
 use super::commit::commit;
 use super::ledger::Told;
 use super::outputs::{refuse_inputs, write_text};
@@ -190,7 +191,7 @@ fn measure_all(
         bench.measure(model, options, hits_out.as_deref_mut(), terminal)
     };
     for path in &arguments.input {
-        let loaded = formats::open(path, &arguments.load.options(), terminal);
+        let loaded = open_scene(path, &arguments.load, &arguments.load.options(), terminal);
         terminal.clear();
         let Loaded { scene, ledger, .. } = loaded?;
         ledger::report(path, &ledger, &scene, Told::Warnings, arguments.load.strict)?;

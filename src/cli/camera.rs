@@ -121,8 +121,11 @@ mod tests {
     /// A quadrilateral 8 wide and 2 high about the origin, as a model file gives it.
     fn bare_model() -> (Scene, Automatic) {
         let positions = [[-4.0, -1.0], [4.0, -1.0], [4.0, 1.0], [-4.0, 1.0]].map(|[x, y]| Vec3::new(x, y, 0.0));
-        let mesh =
-            TriangleMesh { positions: positions.to_vec().into(), indices: vec![[0, 1, 2], [0, 2, 3]].into(), ..Default::default() };
+        let mesh = TriangleMesh {
+            positions: positions.to_vec().into(),
+            indices: vec![[0, 1, 2], [0, 2, 3]].into(),
+            ..Default::default()
+        };
         let object =
             Object { name: String::new(), shape: Shape::Mesh(0), transform: glam::DAffine3::IDENTITY, material: None };
         let mut scene =

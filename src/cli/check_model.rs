@@ -7,13 +7,13 @@ use std::path::Path;
 use glam::DVec3;
 use serde::Serialize;
 
+use super::build::open_scene;
 use super::check::CheckArguments;
 use super::ledger::{self, Told};
 use super::stats_json::SCHEMA;
 use super::terminal::{self, Terminal};
 use crate::accel::{Kind, Params, Preset};
 use crate::error::{Error, Result};
-use crate::formats;
 use crate::geometry::Hit;
 use crate::measure::agreement::{self, Agreement, Class, Example};
 use crate::measure::hexadecimal::hexadecimal;
@@ -27,7 +27,7 @@ use crate::measure::rays::RayFamily;
 /// # Errors
 /// A scene that cannot be opened or built; answers that no bound explains, once all are printed; an interrupt.
 pub fn run(path: &Path, kinds: &[Kind], arguments: &CheckArguments, terminal: &Terminal) -> Result<()> {
-    let loaded = formats::open(path, &arguments.load.options(), terminal);
+    let loaded = open_scene(path, &arguments.load, &arguments.load.options(), terminal);
     terminal.clear();
     let loaded = loaded?;
     ledger::report(path, &loaded.ledger, &loaded.scene, Told::Warnings, arguments.load.strict)?;

@@ -7,13 +7,13 @@ use clap::{Args, ValueHint};
 use serde::Serialize;
 
 use super::arguments::{BuildArguments, CameraArguments, LoadArguments, ValueArguments};
+use super::build::{Plan, open_scene};
 use super::ledger::{self, Told};
 use super::stats_json::{SCHEMA, lossy};
 use super::terminal::{self, Terminal};
 use super::{camera, explain_text, values};
 use crate::error::Result;
-use crate::formats::{self, Loaded};
-use crate::render::Renderer;
+use crate::formats::Loaded;
 use crate::render::explain::{Explanation, Samples};
 use crate::scene::FilmSettings;
 
@@ -73,14 +73,15 @@ pub struct Document<'a> {
 pub fn run(arguments: &ExplainArguments) -> Result<()> {
     let terminal = Terminal::new(false)?;
     super::use_threads(arguments.build.threads)?;
-    let loaded = formats::open(&arguments.input, &arguments.load.options(), &terminal);
+    let loaded = open_scene(&arguments.input, &arguments.load, &arguments.load.options(), &terminal);
     terminal.clear();
-    let Loaded { mut scene, ledger, automatic } = loaded?;
+    let Loaded { mut scene, ledger, automatic, built } = loaded?;
     ledger::report(&arguments.input, &ledger, &scene, Told::Warnings, arguments.load.strict)?;
     arguments.film.apply(&mut scene.film);
     camera::choose(&mut scene, automatic, &arguments.camera, arguments.film.size.is_some(), false)?;
 
-    let renderer = arguments.build.params(&scene, 0).and_then(|params| Renderer::build(scene, &params, &terminal));
+    let renderer =
+        Plan::of(&arguments.build, &scene, built.as_deref(), 0).and_then(|plan| plan.renderer(scene, &terminal));
     terminal.clear();
     let renderer = renderer?;
     let samples = match arguments.sample {

@@ -7,6 +7,7 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::arguments::{CameraArguments, InfoArguments};
+use super::build::{Plan, open_scene};
 use super::camera;
 use super::doctor::Diagnosis;
 use super::estimate::Estimate;
@@ -18,7 +19,7 @@ use super::terminal::{self, Terminal};
 use crate::error::{Error, Result};
 use crate::formats::ledger::Entry;
 use crate::formats::reach::{Census, Reach};
-use crate::formats::{self, Ledger, LoadOptions, Loaded, Treatment};
+use crate::formats::{Ledger, LoadOptions, Loaded, Treatment};
 use crate::geometry::TriangleMesh;
 use crate::geometry::mesh::{DroppedCounts, Materials, Rounding};
 use crate::render::{BuildStats, Renderer};
@@ -179,9 +180,9 @@ pub fn run(arguments: &InfoArguments) -> Result<()> {
     if arguments.tree || arguments.validate || arguments.estimate.estimate {
         arguments.build.refuse_what_does_not_fit(&arguments.input, &options)?;
     }
-    let (loaded, load) = timed(|| formats::open(&arguments.input, &options, &terminal));
+    let (loaded, load) = timed(|| open_scene(&arguments.input, &arguments.load, &options, &terminal));
     terminal.clear();
-    let Loaded { mut scene, ledger, automatic } = loaded?;
+    let Loaded { mut scene, ledger, automatic, built } = loaded?;
     if arguments.estimate.values.size.is_some() {
         arguments.estimate.values.apply(&mut scene.film);
         camera::choose(&mut scene, automatic, &CameraArguments::default(), true, false)?;
@@ -194,9 +195,9 @@ pub fn run(arguments: &InfoArguments) -> Result<()> {
         info.doctor = Some(Diagnosis::of(&scene, info.bounds.as_ref()));
     }
     if arguments.tree || arguments.validate || arguments.estimate.estimate {
-        let params = arguments.build.params(&scene, 0)?;
-        let needed = needed_bytes(&scene, params.kind);
-        let renderer = Renderer::build(scene, &params, &terminal);
+        let plan = Plan::of(&arguments.build, &scene, built.as_deref(), 0)?;
+        let needed = needed_bytes(&scene, plan.kind());
+        let renderer = plan.renderer(scene, &terminal);
         terminal.clear();
         let mut renderer = renderer?;
         info.tree = Some(Tree::of(&renderer, arguments)?);

@@ -8,15 +8,15 @@ use std::time::Duration;
 use clap::{Args, ValueHint};
 use serde_json::json;
 
-use super::arguments::LoadArguments;
+use super::arguments::RenderArguments;
 use super::outputs::{self, Outputs, Picture};
 use super::precision::{AnyRenderer, Precision};
 use super::terminal::{self, Terminal};
 use super::values;
 use crate::error::{Error, Result};
-use crate::formats::{Ledger, picture, scene_file};
+use crate::formats::{Built, Fingerprint, Ledger, LoadOptions, picture, scene_file};
 use crate::job::merge::write_part;
-use crate::job::{Fingerprint, Header, Kept, Share};
+use crate::job::{Header, Kept, Share};
 use crate::render::{Film, RenderSettings, Tile};
 use crate::scene::{Background, Camera, CameraPath, Scene};
 
@@ -114,19 +114,31 @@ fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
     name.into()
 }
 
+/// What a scene was read from, and how.
+pub struct Origin {
+    fingerprint: Fingerprint,
+    options: LoadOptions,
+}
+
+impl Origin {
+    /// That of an input; a built scene's is that of what it was built from, so that both make parts of one picture.
+    ///
+    /// # Errors
+    /// When a file of the scene cannot be read again.
+    pub fn of(arguments: &RenderArguments, ledger: &Ledger, built: Option<&Built>) -> Result<Self> {
+        Ok(match built {
+            Some(built) => Self { fingerprint: built.fingerprint, options: built.options.clone() },
+            None => Self {
+                fingerprint: Fingerprint::of_files(&arguments.input, ledger.files())?,
+                options: arguments.load.options(),
+            },
+        })
+    }
+}
+
 /// What tells the picture from others: everything that changes a pixel, without a frame and a share.
-///
-/// # Errors
-/// When a file of the scene cannot be read again.
-pub fn header(
-    input: &Path,
-    ledger: &Ledger,
-    scene: &Scene,
-    settings: &RenderSettings,
-    load: &LoadArguments,
-    precision: Precision,
-) -> Result<Header> {
-    let options = load.options();
+pub fn header(origin: Origin, scene: &Scene, settings: &RenderSettings, precision: Precision) -> Header {
+    let Origin { fingerprint, options } = origin;
     let settings_of_scene = json!({
         "camera": scene_file::camera_text(&scene.cameras[scene.active_camera]),
         "precision": precision,
@@ -139,9 +151,9 @@ pub fn header(
         "cull_back_faces": options.cull_back_faces,
     });
     let serde_json::Value::Object(names) = settings_of_scene else { unreachable!("it is written as an object") };
-    Ok(Header {
+    Header {
         version: env!("CARGO_PKG_VERSION").into(),
-        scene: Fingerprint::of_files(input, ledger.files())?,
+        scene: fingerprint,
         settings: names,
         film: scene.film,
         crop: settings.crop,
@@ -149,7 +161,7 @@ pub fn header(
         transparent: scene.background == Background::Transparent,
         frame: None,
         share: None,
-    })
+    }
 }
 
 /// Renders what is not kept of a picture or a share, and keeps what is finished. The film has all tiles that are finished; it is complete if

@@ -185,13 +185,7 @@ impl Outputs {
     /// # Errors
     /// Names the file.
     pub fn refuse_clobber(&self, path: &Path) -> Result<()> {
-        // What is no regular file (a device, a pipe) is written to, not replaced.
-        if !self.no_clobber || !path.is_file() {
-            return Ok(());
-        }
-        Err(Error::caller("the file exists and --no-clobber was given")
-            .at_path(path)
-            .remedy("name another file, or leave out --no-clobber"))
+        refuse_clobber(path, self.no_clobber)
     }
 
     /// Finds out whether all of them can be written.
@@ -229,6 +223,20 @@ pub(super) fn refuse_inputs<'a>(output: &Path, inputs: impl IntoIterator<Item = 
     Ok(())
 }
 
+/// Fails if the file exists and must stay.
+///
+/// # Errors
+/// Names the file.
+pub(super) fn refuse_clobber(path: &Path, no_clobber: bool) -> Result<()> {
+    // What is no regular file (a device, a pipe) is written to, not replaced.
+    if !no_clobber || !path.is_file() {
+        return Ok(());
+    }
+    Err(Error::caller("the file exists and --no-clobber was given")
+        .at_path(path)
+        .remedy("name another file, or leave out --no-clobber"))
+}
+
 /// Unlike text, a picture that its reader cut short is a failure: it did not arrive.
 fn write_to_stdout(film: &Film) -> Result<()> {
     let mut stdout = BufWriter::new(io::stdout().lock());
@@ -246,17 +254,18 @@ pub fn write_text(path: &Path, text: &str) -> Result<()> {
 
 /// The input's name with `.png`, in the current folder.
 fn default_picture(input: &Path, is_pattern: bool) -> Result<PathBuf> {
+    named_after(input, &if is_pattern { format!(".{FRAME}.png") } else { ".png".into() })
+}
+
+/// The input's name with another suffix, in the current folder.
+pub(super) fn named_after(input: &Path, suffix: &str) -> Result<PathBuf> {
     let stem = input.file_stem().ok_or_else(|| {
         Error::caller("this is no file")
             .at_path(input)
             .remedy("give a scene file (.toml) or a model (.obj, .gltf, .glb)")
     })?;
     let mut name = stem.to_os_string();
-    if is_pattern {
-        name.push(".");
-        name.push(FRAME);
-    }
-    name.push(".png");
+    name.push(suffix);
     Ok(name.into())
 }
 

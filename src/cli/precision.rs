@@ -1,6 +1,6 @@
 //! `--precision`: in what rays are traced.
 
-use crate::accel::Params;
+use super::build::Plan;
 use crate::error::Result;
 use crate::measure::reference::ReferenceRenderer;
 use crate::progress::Progress;
@@ -31,10 +31,10 @@ pub enum AnyRenderer {
 }
 
 impl AnyRenderer {
-    /// Builds what the precision needs; `params` are for f32 alone.
-    pub fn build(scene: Scene, precision: Precision, params: &Params, progress: &dyn Progress) -> Result<Self> {
+    /// Builds what the precision needs; the plan is for f32 alone.
+    pub fn build(scene: Scene, precision: Precision, plan: &Plan<'_>, progress: &dyn Progress) -> Result<Self> {
         Ok(match precision {
-            Precision::F32 => Self::F32(Box::new(Renderer::build(scene, params, progress)?)),
+            Precision::F32 => Self::F32(Box::new(plan.renderer(scene, progress)?)),
             Precision::F64 => Self::F64(Box::new(ReferenceRenderer::build(scene, progress)?)),
         })
     }

@@ -8,6 +8,7 @@ use clap::{Args, ValueHint};
 use rayon::prelude::*;
 
 use super::arguments::{BuildArguments, LoadArguments};
+use super::build::{Plan, open_scene};
 use super::ledger::{self, Told};
 use super::outputs::refuse_inputs;
 use super::stream::Stream;
@@ -15,7 +16,7 @@ use super::terminal::Terminal;
 use super::values::one_of;
 use crate::error::{Error, Result};
 use crate::formats::atomic_file::{check_writable, write_atomically};
-use crate::formats::{self, LoadOptions, Loaded};
+use crate::formats::{Built, LoadOptions, Loaded};
 use crate::geometry::{Hit, Ray};
 use crate::measure::hit_file::HitWriter;
 use crate::measure::oracle::Oracle;
@@ -111,14 +112,14 @@ pub fn run(arguments: &QueryArguments) -> Result<()> {
     };
 
     let options = LoadOptions { faces: arguments.faces, ..arguments.load.options() };
-    let loaded = formats::open(&arguments.input, &options, &terminal);
+    let loaded = open_scene(&arguments.input, &arguments.load, &options, &terminal);
     terminal.clear();
-    let Loaded { scene, ledger, .. } = loaded?;
+    let Loaded { scene, ledger, built, .. } = loaded?;
     ledger::report(&arguments.input, &ledger, &scene, Told::Warnings, arguments.load.strict)?;
     if let Some(path) = to_file {
         refuse_inputs(path, ledger.files())?;
     }
-    let answerer = Answerer::build(scene, arguments, &terminal);
+    let answerer = Answerer::build(scene, built.as_deref(), arguments, &terminal);
     terminal.clear();
     let answerer = answerer?;
 
@@ -209,11 +210,11 @@ enum Answerer {
 }
 
 impl Answerer {
-    fn build(scene: Scene, arguments: &QueryArguments, progress: &dyn Progress) -> Result<Self> {
+    fn build(scene: Scene, built: Option<&Built>, arguments: &QueryArguments, progress: &dyn Progress) -> Result<Self> {
         match arguments.precision {
             Precision::F32 => {
-                let params = arguments.build.params(&scene, 0)?;
-                Ok(Self::F32(Box::new(Renderer::build(scene, &params, progress)?)))
+                let plan = Plan::of(&arguments.build, &scene, built, 0)?;
+                Ok(Self::F32(Box::new(plan.renderer(scene, progress)?)))
             }
             Precision::Exact => {
                 arguments.build.refuse_limit("--precision exact")?;

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::arguments::RenderArguments;
+use super::build::{Plan, open_scene};
 use super::ledger::{self, Told};
 use super::memory_limit::picture_bytes;
 use super::outputs::Outputs;
@@ -29,8 +30,8 @@ pub fn run(arguments: &RenderArguments) -> Result<()> {
         terminal::set_time_limit(limit);
     }
     let outputs = Outputs::plan(arguments)?;
-    if outputs.scene.is_some() && formats::is_scene(&arguments.input)? {
-        return Err(Error::caller("this is a scene file already; only what was chosen for a model can be saved")
+    if outputs.scene.is_some() && (formats::is_scene(&arguments.input)? || formats::is_built(&arguments.input)?) {
+        return Err(Error::caller("this is a scene already; only what was chosen for a model can be saved")
             .at_path(&arguments.input)
             .remedy("leave out --save-scene"));
     }
@@ -52,14 +53,18 @@ pub fn run(arguments: &RenderArguments) -> Result<()> {
         arguments.build.refuse_what_does_not_fit(&arguments.input, &options)?;
     }
     let loaded;
-    (loaded, seconds.load) = timed(|| formats::open(&arguments.input, &options, &terminal));
+    (loaded, seconds.load) = timed(|| open_scene(&arguments.input, &arguments.load, &options, &terminal));
     terminal.clear();
-    let formats::Loaded { mut scene, ledger, automatic } = loaded?;
+    let formats::Loaded { mut scene, ledger, automatic, built } = loaded?;
     // With --verbose they come with all else, once it is known in how many pixels they are seen.
     let told = if arguments.quiet || arguments.verbose { Told::Nothing } else { Told::Warnings };
     ledger::report(&arguments.input, &ledger, &scene, told, arguments.load.strict)?;
     pictures.iter().try_for_each(|(_, outputs)| outputs.refuse_inputs(ledger.files()))?;
     report_time(arguments, "load", seconds.load);
+    if let Some(built) = built.as_deref().filter(|_| arguments.verbose) {
+        let rate = built.bytes as f64 / 1e9 / built.check_seconds.max(f64::MIN_POSITIVE);
+        terminal::report(&format!("check    {:9.3} s, {rate:.2} GB a second", built.check_seconds));
+    }
     terminal.check()?;
     arguments.film.apply(&mut scene.film);
     if let Some(crop) = arguments.film.crop {
@@ -77,16 +82,17 @@ pub fn run(arguments: &RenderArguments) -> Result<()> {
     if arguments.precision == Precision::F64 {
         arguments.build.refuse_limit("--precision f64")?;
     }
-    let header = arguments
-        .job
-        .writes_tiles()
-        .then(|| job::header(&arguments.input, &ledger, &scene, &settings, &arguments.load, arguments.precision));
-    let header = header.transpose()?;
+    let header = if arguments.job.writes_tiles() {
+        let origin = job::Origin::of(arguments, &ledger, built.as_deref())?;
+        Some(job::header(origin, &scene, &settings, arguments.precision))
+    } else {
+        None
+    };
     let camera = scene.cameras[scene.active_camera].clone();
     let picture = picture_bytes(&scene, settings.crop, &settings.aovs);
-    let params = arguments.build.params(&scene, picture)?;
+    let plan = Plan::of(&arguments.build, &scene, built.as_deref(), picture)?;
     let renderer;
-    (renderer, seconds.build) = timed(|| AnyRenderer::build(scene, arguments.precision, &params, &terminal));
+    (renderer, seconds.build) = timed(|| AnyRenderer::build(scene, arguments.precision, &plan, &terminal));
     terminal.clear();
     let renderer = renderer?;
     report_time(arguments, "build", seconds.build);

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueHint};
 
+use super::build::open_scene;
 use super::commit::commit;
 use super::ledger::Told;
 use super::query::FORMATS;
@@ -181,7 +182,7 @@ impl Part<'_> {
         match self {
             Self::Hard(set) => Ok(Subject::hard(*set)),
             Self::File(path) => {
-                let loaded = formats::open(path, &arguments.load.options(), terminal);
+                let loaded = open_scene(path, &arguments.load, &arguments.load.options(), terminal);
                 terminal.clear();
                 let Loaded { scene, ledger, .. } = loaded?;
                 ledger::report(path, &ledger, &scene, Told::Warnings, arguments.load.strict)?;

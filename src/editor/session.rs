@@ -76,6 +76,11 @@ impl Session {
             let text = std::fs::read_to_string(path).map_err(|cause| Error::system(path, cause))?;
             return Self::of_text(&text, Some(path.to_path_buf()), path.to_path_buf(), options.clone(), progress);
         }
+        if formats::is_built(path)? {
+            return Err(Error::unsupported("a built scene cannot be edited")
+                .at_path(path)
+                .remedy("open the scene or model that it was built from"));
+        }
         let scene = formats::open(path, options, progress)?.scene;
         let place = path.with_extension("toml");
         let text = model_scene(&scene, path, options, &place)?;

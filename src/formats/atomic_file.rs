@@ -278,7 +278,8 @@ mod tests {
             write_atomically(&path, |sink| sink.write_all(b"new").map_err(|cause| Error::system(Path::new("x"), cause)))
         };
         let names = || {
-            let mut names: Vec<_> = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+            let mut names: Vec<_> =
+                fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
             names.sort();
             names
         };

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// What became of a feature.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Treatment {
     /// Used as the format says.
@@ -18,7 +18,7 @@ pub enum Treatment {
 }
 
 /// What of a scene a feature belongs to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub enum Scope {
     /// All triangles of a material, by its position in the list of materials.
     Material(u32),
@@ -27,7 +27,7 @@ pub enum Scope {
 }
 
 /// One feature, as it was met.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Entry {
     /// How often.
     pub count: u64,
@@ -36,7 +36,7 @@ pub struct Entry {
 }
 
 /// Features met in a file, with counts, and the files that were read for it.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Ledger {
     entries: BTreeMap<(Treatment, String), Entry>,
     files: BTreeSet<PathBuf>,

@@ -1,6 +1,8 @@
 //! Files in and pictures out. Readers return plain scene data; nothing here knows how rays are traced.
 
 pub mod atomic_file;
+pub mod built;
+pub mod fingerprint;
 pub mod gltf;
 pub mod image_file;
 pub mod ledger;
@@ -24,13 +26,15 @@ use crate::progress::Progress;
 use crate::scene::auto::{self, Automatic};
 use crate::scene::{Camera, LightKind, Projection, Scene, exposure, origin};
 
+pub use built::Built;
+pub use fingerprint::Fingerprint;
 pub use ledger::{Ledger, Scope, Treatment};
 pub use limits::Limits;
 pub use model::Model;
 pub use outline::Outline;
 
 /// Which shading normals a mesh gets.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum NormalMode {
     /// Those of the file; where it has none, what its format prescribes (flat).
@@ -43,7 +47,7 @@ pub enum NormalMode {
 }
 
 /// Which axis of a model file points up.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum UpAxis {
     /// +Y: glTF always, OBJ mostly.
@@ -64,7 +68,7 @@ impl UpAxis {
 }
 
 /// How a file is read.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct LoadOptions {
     /// Shading normals of meshes.
     pub normals: NormalMode,
@@ -98,10 +102,12 @@ pub struct Loaded {
     pub ledger: Ledger,
     /// What the scene lacked and was given.
     pub automatic: Automatic,
+    /// What is built of it already, where it was read from a file of a built scene.
+    pub built: Option<Box<Built>>,
 }
 
 /// Formats that [`open`] reads, for messages.
-const ACCEPTED: &str = "accepted are .toml (scene), .obj, .gltf and .glb (models)";
+const ACCEPTED: &str = "accepted are .toml (scene), .obj, .gltf and .glb (models), and .whb (built scene)";
 
 /// Formats of scenes and models.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -109,9 +115,11 @@ enum Format {
     Scene,
     Obj,
     Gltf,
+    Built,
 }
 
-/// Opens a scene file (`.toml`) or a model (`.obj`, `.gltf`, `.glb`), chosen by suffix and, failing that, by content.
+/// Opens a scene file (`.toml`), a model (`.obj`, `.gltf`, `.glb`) or a built scene (`.whb`), chosen by suffix and, failing that, by
+/// content. A built scene was read with options of its own.
 ///
 /// A model alone becomes a scene with an automatic camera, lights and background; lights of its own in physical units
 /// set the film's exposure.
@@ -119,10 +127,14 @@ enum Format {
 /// # Errors
 /// Names the file, and line and column where there are such, and what would mend it.
 pub fn open(path: &Path, options: &LoadOptions, progress: &dyn Progress) -> Result<Loaded> {
-    if format_of(path)? == Format::Scene {
-        let mut loaded = scene_file::read(path, options, progress)?;
-        loaded.scene.origin = origin::choose(&loaded.scene);
-        return Ok(loaded);
+    match format_of(path)? {
+        Format::Scene => {
+            let mut loaded = scene_file::read(path, options, progress)?;
+            loaded.scene.origin = origin::choose(&loaded.scene);
+            return Ok(loaded);
+        }
+        Format::Built => return built::open(path, progress),
+        Format::Obj | Format::Gltf => {}
     }
     let model = load_model(path, options, progress)?;
     let mut scene = Scene::default();
@@ -134,7 +146,7 @@ pub fn open(path: &Path, options: &LoadOptions, progress: &dyn Progress) -> Resu
         scene.film.exposure = exposure::automatic(&scene);
     }
     let automatic = auto::complete(&mut scene);
-    Ok(Loaded { scene, ledger, automatic })
+    Ok(Loaded { scene, ledger, automatic, built: None })
 }
 
 /// Whether [`open`] takes the file for a scene file rather than a model.
@@ -143,6 +155,14 @@ pub fn open(path: &Path, options: &LoadOptions, progress: &dyn Progress) -> Resu
 /// A file that cannot be read, or that is neither.
 pub fn is_scene(path: &Path) -> Result<bool> {
     Ok(format_of(path)? == Format::Scene)
+}
+
+/// Whether [`open`] takes the file for a built scene.
+///
+/// # Errors
+/// As [`is_scene`].
+pub fn is_built(path: &Path) -> Result<bool> {
+    Ok(format_of(path)? == Format::Built)
 }
 
 /// Loads a model file on its own.
@@ -154,6 +174,9 @@ pub fn load_model(path: &Path, options: &LoadOptions, progress: &dyn Progress) -
         Format::Obj => obj::load(path, options, progress),
         Format::Gltf => gltf::load(path, options, progress),
         Format::Scene => Err(Error::unsupported("a scene file cannot be used as a mesh").at_path(path)),
+        Format::Built => Err(Error::unsupported("a built scene cannot be used as a mesh")
+            .at_path(path)
+            .remedy("name the model that it was built from")),
     }
 }
 
@@ -171,6 +194,7 @@ fn format_of(path: &Path) -> Result<Format> {
         "toml" => return Ok(Format::Scene),
         "obj" => return Ok(Format::Obj),
         "gltf" | "glb" => return Ok(Format::Gltf),
+        "whb" => return Ok(Format::Built),
         _ => {}
     }
     let mut start = Vec::new();
@@ -186,6 +210,9 @@ fn format_of(path: &Path) -> Result<Format> {
 
 /// The format by the first bytes of a file.
 fn sniff(start: &[u8]) -> Option<Format> {
+    if built::is_built(start) {
+        return Some(Format::Built);
+    }
     if start.starts_with(b"glTF") {
         return Some(Format::Gltf);
     }

@@ -32,6 +32,7 @@ impl Outline {
         match format_of(path)? {
             Format::Obj => Self::of_obj(path),
             Format::Gltf => gltf::outline(path, options),
+            Format::Built => Err(crate::error::Error::unsupported("a built scene has no outline").at_path(path)),
             Format::Scene => {
                 let mut all = Self::default();
                 for model in models_of(path) {

@@ -101,7 +101,10 @@ mod tests {
         let mesh = |materials| {
             let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y];
             let indices = vec![[0, 1, 2], [2, 1, 0], [0, 0, 1]];
-            TriangleMesh { positions: positions.into(), indices: indices.into(), materials, ..Default::default() }.finish().unwrap().into()
+            TriangleMesh { positions: positions.into(), indices: indices.into(), materials, ..Default::default() }
+                .finish()
+                .unwrap()
+                .into()
         };
         let meshes = vec![mesh(Materials::PerTriangle(vec![0, 1, 1].into())), mesh(Materials::One(1))];
         Census::of(&Scene { meshes, ..Default::default() })

@@ -7,7 +7,7 @@ use crate::math::float::{gamma, round_down_vec, round_up_vec};
 use crate::math::transform::Transform;
 
 /// A closed axis-aligned box. The empty box has `min > max`.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Bounds {
     /// The least corner.
     pub min: Vec3,

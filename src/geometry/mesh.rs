@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::collections::HashMap;
 
 use glam::{DVec3, Vec2, Vec3, Vec4};
+use rayon::prelude::*;
 use robust::{Coord, orient2d};
 
 use crate::array::Array;
@@ -69,7 +70,7 @@ pub struct Group {
 }
 
 /// What storing a file's positions in f32 cost, in the file's units.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Rounding {
     /// The largest distance of a stored coordinate from the file's, over the vertices of faces.
     pub largest_loss: f64,
@@ -101,7 +102,7 @@ impl Default for Materials {
 }
 
 /// How many triangles were dropped, by reason.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct DroppedCounts {
     /// A vertex that is NaN, infinite or, as stored, beyond [`FARTHEST_COORDINATE`] in magnitude.
     pub non_finite: u64,
@@ -134,6 +135,33 @@ impl TriangleMesh {
     /// A limit where a count does not fit 32 bits; a caller's error where an attribute array has another length than
     /// `positions`.
     pub fn finish(mut self) -> Result<Self> {
+        self.check_lengths()?;
+        self.bring_into_range();
+        let mut counts = DroppedCounts::default();
+        let mut dropped = Vec::new();
+        for (number, indices) in self.indices.iter().enumerate() {
+            let reason = match indices.map(|i| self.positions.get(i as usize).copied()) {
+                [Some(a), Some(b), Some(c)] => {
+                    if ![a, b, c].into_iter().all(is_usable) {
+                        &mut counts.non_finite
+                    } else if has_zero_area(a, b, c) {
+                        &mut counts.zero_area
+                    } else {
+                        continue;
+                    }
+                }
+                _ => &mut counts.bad_index,
+            };
+            *reason += 1;
+            dropped.push(number as u32);
+        }
+        self.dropped = dropped.into();
+        self.dropped_counts = counts;
+        Ok(self)
+    }
+
+    /// Checks the lengths of arrays against each other.
+    fn check_lengths(&self) -> Result<()> {
         if u32::try_from(self.indices.len()).is_err() || u32::try_from(self.positions.len()).is_err() {
             return Err(Error::limit(format!("mesh `{}` has more than 4294967295 triangles or vertices", self.name)));
         }
@@ -163,28 +191,39 @@ impl TriangleMesh {
                 self.indices.len()
             )));
         }
-        self.bring_into_range();
-        let mut counts = DroppedCounts::default();
-        let mut dropped = Vec::new();
-        for (number, indices) in self.indices.iter().enumerate() {
-            let reason = match indices.map(|i| self.positions.get(i as usize).copied()) {
-                [Some(a), Some(b), Some(c)] => {
-                    if ![a, b, c].into_iter().all(is_usable) {
-                        &mut counts.non_finite
-                    } else if has_zero_area(a, b, c) {
-                        &mut counts.zero_area
-                    } else {
-                        continue;
-                    }
-                }
-                _ => &mut counts.bad_index,
-            };
-            *reason += 1;
-            dropped.push(number as u32);
+        Ok(())
+    }
+
+    /// Checks a mesh that was [finished](Self::finish) once and read back: the lengths of its arrays, and every number that names a
+    /// vertex or a triangle.
+    ///
+    /// # Errors
+    /// As `finish`; a file's error where a number names what is not there.
+    pub fn check_numbers(&self) -> Result<()> {
+        self.check_lengths()?;
+        let flawed = |what: &str| Err(Error::file(format!("mesh `{}` has {what}", self.name)));
+        if self.source_faces.as_ref().is_some_and(|faces| faces.len() != self.indices.len()) {
+            return flawed("another number of source faces than triangles");
         }
-        self.dropped = dropped.into();
-        self.dropped_counts = counts;
-        Ok(self)
+        let triangles = self.indices.len();
+        if !self.dropped.is_sorted_by(|one, next| one < next)
+            || self.dropped.last().is_some_and(|&n| n as usize >= triangles)
+        {
+            return flawed("dropped triangles that are not there");
+        }
+        if !self.groups.is_sorted_by_key(|group| group.first_triangle)
+            || self.groups.last().is_some_and(|group| group.first_triangle as usize > triangles)
+        {
+            return flawed("groups of triangles that are not there");
+        }
+        let vertices = self.positions.len();
+        let is_there = |corners: &[u32; 3]| corners.iter().all(|&corner| (corner as usize) < vertices);
+        let missing = |number: usize| !is_there(&self.indices[number]);
+        let is_dropped = |number: usize| self.dropped.binary_search(&(number as u32)).is_ok();
+        if (0..triangles).into_par_iter().with_min_len(1 << 16).any(|number| missing(number) && !is_dropped(number)) {
+            return flawed("triangles of vertices that are not there");
+        }
+        Ok(())
     }
 
     /// Where a position of this mesh stands in the file's coordinates.
@@ -362,7 +401,8 @@ mod tests {
                 Vec3::new(2.0, 0.0, 0.0),
                 Vec3::new(f32::NAN, 0.0, 0.0),
                 Vec3::new(3e38, 0.0, 0.0),
-            ].into(),
+            ]
+            .into(),
             indices: vec![[0, 1, 3], [0, 1, 2], [0, 0, 1], [4, 1, 2], [5, 1, 2], [0, 1, 9], [2, 1, 0]].into(),
             ..Default::default()
         };
@@ -377,7 +417,11 @@ mod tests {
     fn huge_and_tiny_meshes_are_scaled_by_a_power_of_two() {
         for size in [1e13f32, 1.8e18, 1e30, 1e-13, 1e-25] {
             let positions = vec![Vec3::ZERO, Vec3::X * size, Vec3::new(0.3, 0.7, 0.1) * size];
-            let mesh = TriangleMesh { positions: positions.clone().into(), indices: vec![[0, 1, 2]].into(), ..Default::default() };
+            let mesh = TriangleMesh {
+                positions: positions.clone().into(),
+                indices: vec![[0, 1, 2]].into(),
+                ..Default::default()
+            };
             let mesh = mesh.finish().unwrap();
             assert_eq!(mesh.live_count(), 1, "{size:e}");
             assert!((0.5..=2.0).contains(&mesh.positions[1].x), "{size:e}");
@@ -388,7 +432,11 @@ mod tests {
         // One vertex far out leaves the others alone; it is dropped where f32 could not answer for it.
         for (far, live) in [(3e38, 1), (1.8e18, 2), (FARTHEST_COORDINATE, 2), (FARTHEST_COORDINATE.next_up(), 1)] {
             let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::splat(far)];
-            let mesh = TriangleMesh { positions: positions.into(), indices: vec![[0, 1, 2], [0, 1, 3]].into(), ..Default::default() };
+            let mesh = TriangleMesh {
+                positions: positions.into(),
+                indices: vec![[0, 1, 2], [0, 1, 3]].into(),
+                ..Default::default()
+            };
             let mesh = mesh.finish().unwrap();
             assert_eq!((mesh.exponent, mesh.live_count()), (0, live), "{far:e}");
             assert_eq!(mesh.dropped_counts.non_finite, 2 - live as u64, "{far:e}");
@@ -407,7 +455,8 @@ mod tests {
 
     #[test]
     fn mismatched_attributes_are_refused() {
-        let mesh = TriangleMesh { positions: vec![Vec3::ZERO; 3].into(), normals: Some(vec![].into()), ..Default::default() };
+        let mesh =
+            TriangleMesh { positions: vec![Vec3::ZERO; 3].into(), normals: Some(vec![].into()), ..Default::default() };
         assert!(mesh.finish().is_err());
     }
 }

@@ -13,7 +13,7 @@ use crate::math::quadratic::{Roots, solve};
 use crate::math::vector::{length, normalize};
 
 /// A closed object-space box that cuts a quadric; sides may be infinite.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Clip {
     /// The least corner.
     pub min: DVec3,
@@ -39,7 +39,7 @@ impl Clip {
 }
 
 /// How texture coordinates lie on a quadric; u, v from the lower left of the image, not mirrored seen from outside.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum Mapping {
     /// Longitude and latitude around the centre; the image's middle faces +Z, its top +Y.
     Spherical,
@@ -59,7 +59,7 @@ pub enum Mapping {
 
 /// A quadric surface, possibly clipped by a box, either as a bare surface or as the boundary of the solid
 /// `{ F <= 0 }` within the box.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Quadric {
     form: QuadricForm,
     clip: Clip,

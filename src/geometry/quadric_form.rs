@@ -10,7 +10,7 @@ use crate::math::vector::dot;
 /// Coefficients are scaled by a power of two so that the largest is near 1. What rounding leaves where the rank is
 /// lower (a cylinder's curvature along its axis, a centred form's linear part) is cleared: a tilted cylinder must not
 /// be an ellipsoid 1e8 long.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct QuadricForm {
     /// Object-space point where `y` is 0: the centre, or the point of the axis nearest to the object's origin.
     center: DVec3,

@@ -4,7 +4,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::error::{Error, Result};
-use crate::job::{Fingerprint, Share};
+use crate::formats::Fingerprint;
+use crate::job::Share;
 use crate::render::{AovKind, Crop, Film, Tiles};
 use crate::scene::FilmSettings;
 

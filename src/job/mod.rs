@@ -7,14 +7,12 @@
 //! tile's bytes depend on scene and settings alone, it does not matter who renders it, or how often.
 
 pub mod estimate;
-pub mod fingerprint;
 pub mod header;
 pub mod kept;
 pub mod merge;
 pub mod share;
 pub mod tile_file;
 
-pub use fingerprint::Fingerprint;
 pub use header::Header;
 pub use kept::Kept;
 pub use merge::merge;

@@ -148,12 +148,7 @@ impl<A: TriangleAccelerator> TwoLevel<A> {
     ///
     /// # Errors
     /// A singular transform; a cancellation; trees that are no trees of the scene's meshes.
-    pub fn build(
-        scene: &Scene,
-        ready: &Ready<'_, A>,
-        params: &Params,
-        progress: &dyn Progress,
-    ) -> Result<Self> {
+    pub fn build(scene: &Scene, ready: &Ready<'_, A>, params: &Params, progress: &dyn Progress) -> Result<Self> {
         let (world, meshes) = match *ready {
             Ready::Nothing => (World::new(scene)?, Self::build_meshes(scene, None, params, progress)?),
             Ready::State(other, structure) => {
@@ -524,7 +519,7 @@ mod tests {
         let mut found = Vec::new();
         for threads in [1, 2, 5] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            let build = || TwoLevel::<Wide>::build(&scene, None, &Params::default(), &Silent).unwrap();
+            let build = || TwoLevel::<Wide>::build(&scene, &Ready::Nothing, &Params::default(), &Silent).unwrap();
             let built = pool.install(build);
             assert_eq!(built.validate(), Ok(()));
             found.push(Intersect::closest(&built, &ray));

@@ -61,6 +61,12 @@ macro_rules! any_two_level {
         }
 
         impl AnyTwoLevel {
+            fn kind(&self) -> Kind {
+                match self {
+                    $(Self::$name(_) => Kind::$name,)+
+                }
+            }
+
             /// Builds what is not there before.
             fn build(scene: &Scene, before: Before<'_>, params: &Params, progress: &dyn Progress) -> Result<Self> {
                 match params.kind.resolve() {
@@ -121,12 +127,7 @@ impl Renderer {
         with_structure!(&self.intersect, structure => structure.arrays())
     }
 
-    fn build_on(
-        scene: Scene,
-        before: Before<'_>,
-        params: &Params,
-        progress: &dyn Progress,
-    ) -> Result<Self> {
+    fn build_on(scene: Scene, before: Before<'_>, params: &Params, progress: &dyn Progress) -> Result<Self> {
         let start = Instant::now();
         progress.begin("build", scene.meshes.iter().map(|mesh| mesh.live_count() as u64).sum());
         let intersect = AnyTwoLevel::build(&scene, before, params, progress)?;
@@ -256,6 +257,11 @@ impl Renderer {
         with_structure!(&self.intersect, structure => {
             explain::explain(&self.scene, structure.world(), structure, (x, y), samples, progress)
         })
+    }
+
+    /// The kind of the structures.
+    pub fn kind(&self) -> Kind {
+        self.intersect.kind()
     }
 
     /// What building took.

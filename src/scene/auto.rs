@@ -58,7 +58,7 @@ const MARGIN: f64 = 0.06;
 pub const CAMERA_NAME: &str = "auto";
 
 /// What of a scene was chosen automatically, and so is chosen again for another view of it.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Automatic {
     /// The only camera.
     pub camera: bool,
@@ -241,7 +241,9 @@ mod tests {
     fn cube() -> Scene {
         let positions = crate::geometry::Bounds { min: Vec3::splat(-1.0), max: Vec3::ONE }.corners().to_vec();
         let indices = vec![[0, 1, 2], [3, 2, 1], [4, 5, 6], [7, 6, 5], [0, 1, 4], [2, 3, 6]];
-        let mesh = TriangleMesh { positions: positions.into(), indices: indices.into(), ..Default::default() }.finish().unwrap();
+        let mesh = TriangleMesh { positions: positions.into(), indices: indices.into(), ..Default::default() }
+            .finish()
+            .unwrap();
         let object = |x: f64| Object {
             name: String::new(),
             shape: Shape::Mesh(0),
@@ -307,7 +309,8 @@ mod tests {
             let mut indices = vec![[0, 1, 2]; base];
             // Neither the first nor the last corner.
             indices.insert(base / 2, [0, 3, 1]);
-            let mesh = TriangleMesh { positions: positions.clone().into(), indices: indices.into(), ..Default::default() };
+            let mesh =
+                TriangleMesh { positions: positions.clone().into(), indices: indices.into(), ..Default::default() };
             let object = Object { shape: Shape::Mesh(0), ..cube().objects[0].clone() };
             let scene =
                 Scene { meshes: vec![mesh.finish().unwrap().into()], objects: vec![object], ..Default::default() };

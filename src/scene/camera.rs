@@ -9,7 +9,7 @@ use crate::math::vector::{cross, dot, is_safe, normalize};
 use crate::scene::camera_path::CameraPath;
 
 /// A camera with its name in the file.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct NamedCamera {
     /// What `--camera` selects.
     pub name: String,
@@ -32,7 +32,7 @@ impl NamedCamera {
 }
 
 /// A camera in the file's coordinates, f64.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum Camera {
     /// Stands somewhere and looks at a point.
     LookAt {
@@ -60,7 +60,7 @@ pub enum Camera {
 }
 
 /// How a look-at camera projects.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum Projection {
     /// All rays start at the eye.
     Perspective {

@@ -8,7 +8,7 @@ use crate::math::vector::{cross, dot, normalize};
 use crate::scene::camera::{Camera, Projection};
 
 /// The way of a look-at camera.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum CameraPath {
     /// Around the target and the upward axis, counter-clockwise seen from above: once in so many frames, from where the camera
     /// stands in frame 0.
@@ -21,7 +21,7 @@ pub enum CameraPath {
 }
 
 /// Where a camera is in one frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct CameraKey {
     /// The frame.
     pub frame: i32,

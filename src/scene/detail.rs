@@ -7,7 +7,7 @@ use crate::scene::microfacet::Surface;
 use crate::scene::{Material, Rgb, TextureRef, luminance};
 
 /// What a material's terms are at each point.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Detail {
     /// By what rule the terms come from images.
     pub rule: Rule,
@@ -20,7 +20,7 @@ pub struct Detail {
 }
 
 /// How terms come from images.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum Rule {
     /// They are the material's own, but for the highlight's weight, which an image may multiply.
     Phong {
@@ -39,7 +39,7 @@ pub enum Rule {
 }
 
 /// How much of a surface is there.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Alpha {
     /// What is done with it.
     pub mode: AlphaMode,
@@ -50,7 +50,7 @@ pub struct Alpha {
 }
 
 /// What alpha means.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum AlphaMode {
     /// The surface is there where alpha is not below this, and nowhere else.
     Mask {
@@ -62,7 +62,7 @@ pub enum AlphaMode {
 }
 
 /// Which of an image's values is meant.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 pub enum Channel {
     /// The first.
     Red,
@@ -78,7 +78,7 @@ pub enum Channel {
 
 /// An image of normals: each texel's red, green and blue, from 0 to 1, stand for -1 to 1 along the tangent (growing u), the
 /// bitangent (growing v, up) and the normal.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct NormalMap {
     /// The image; its values are not colours.
     pub texture: TextureRef,
@@ -87,7 +87,7 @@ pub struct NormalMap {
 }
 
 /// glTF's metallic-roughness material with KHR_materials_ior, _specular and _transmission.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct MetallicRoughness {
     /// The base colour, which the diffuse texture multiplies.
     pub base: Rgb,
@@ -114,7 +114,7 @@ pub struct MetallicRoughness {
 }
 
 /// KHR_materials_pbrSpecularGlossiness.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SpecularGlossiness {
     /// The diffuse colour, which the diffuse texture multiplies.
     pub diffuse: Rgb,

@@ -5,7 +5,7 @@ use glam::DVec3;
 use crate::scene::Rgb;
 
 /// How a light weakens with distance.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum Falloff {
     /// Not at all: the seed.
     #[default]
@@ -15,7 +15,7 @@ pub enum Falloff {
 }
 
 /// Where light comes from.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum LightKind {
     /// From a point.
     Point {
@@ -45,7 +45,7 @@ pub enum LightKind {
 }
 
 /// One light.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Light {
     /// For messages and `info`.
     pub name: String,

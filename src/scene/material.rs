@@ -6,7 +6,7 @@ use crate::scene::Rgb;
 use crate::scene::detail::Detail;
 
 /// A texture as a material uses it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct TextureRef {
     /// Position in the scene's list of textures.
     pub texture: u32,
@@ -41,7 +41,7 @@ impl TextureRef {
 ///
 /// All colours and weights are linear, per channel. Where there is [`detail`](Self::detail) they are means, and
 /// [`at`](Self::at) gives those of a point.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Material {
     /// For messages, overrides and `info`.
     pub name: String,

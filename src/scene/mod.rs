@@ -33,6 +33,7 @@ pub use texture::Texture;
 
 use glam::DVec3;
 
+use crate::geometry::mesh::Materials;
 use crate::geometry::{Quadric, TriangleMesh};
 
 /// A linear colour or weight, red, green, blue (Rec. 709 primaries).
@@ -133,6 +134,41 @@ impl Scene {
             }
         }
         used
+    }
+
+    /// Whether every number that names something names what there is, and settings are within their limits. What meshes say of
+    /// themselves is for [`TriangleMesh::check_numbers`].
+    ///
+    /// # Errors
+    /// Says what names something that is not there.
+    pub fn check_numbers(&self) -> Result<(), String> {
+        let names = |is_there: bool, what: &str, of: &str| {
+            if is_there { Ok(()) } else { Err(format!("{of} names a {what} that is not there")) }
+        };
+        names(self.active_camera < self.cameras.len(), "camera", "the scene")?;
+        names(!self.materials.is_empty(), "material", "the scene")?;
+        for material in &self.materials {
+            let mut textures = material.textures();
+            let is_there = textures.all(|texture| (texture.texture as usize) < self.textures.len());
+            names(is_there, "texture", &format!("the material `{}`", material.name))?;
+        }
+        let is_material = |number: u32| (number as usize) < self.materials.len();
+        for object in &self.objects {
+            let is_there = match object.shape {
+                Shape::Mesh(number) => (number as usize) < self.meshes.len(),
+                Shape::Quadric(number) => (number as usize) < self.quadrics.len(),
+            };
+            names(is_there, "shape", &format!("the object `{}`", object.name))?;
+            names(object.material.is_none_or(is_material), "material", &format!("the object `{}`", object.name))?;
+        }
+        for mesh in &self.meshes {
+            let is_there = match &mesh.materials {
+                Materials::One(material) => is_material(*material),
+                Materials::PerTriangle(materials) => materials.iter().all(|&material| is_material(material)),
+            };
+            names(is_there, "material", &format!("the mesh `{}`", mesh.name))?;
+        }
+        self.film.check().map_err(|error| error.to_string())
     }
 
     /// Number of triangles with every instance counted, dropped ones left out.

@@ -3,7 +3,7 @@
 use glam::DAffine3;
 
 /// What an object is made of, as a position in the scene's list.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 pub enum Shape {
     /// A position in `Scene::meshes`.
     Mesh(u32),
@@ -12,7 +12,7 @@ pub enum Shape {
 }
 
 /// A shape in the scene: an instance.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Object {
     /// For messages, `info` and `explain`.
     pub name: String,

@@ -67,7 +67,11 @@ mod tests {
 
     fn scene(triangles: usize, instances: usize) -> Scene {
         let positions = vec![Vec3::ZERO, Vec3::X, Vec3::new(0.25, 1.0, 0.5), Vec3::splat(99.0)];
-        let mesh = TriangleMesh { positions: positions.into(), indices: vec![[0, 1, 2]; triangles].into(), ..Default::default() };
+        let mesh = TriangleMesh {
+            positions: positions.into(),
+            indices: vec![[0, 1, 2]; triangles].into(),
+            ..Default::default()
+        };
         let object = |shape, transform| Object { name: String::new(), shape, transform, material: None };
         let place = |i: usize| DAffine3::from_translation(DVec3::new(0.0, i as f64, 0.0));
         let mut objects: Vec<_> = (0..instances).map(|i| object(Shape::Mesh(0), place(i))).collect();

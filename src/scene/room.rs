@@ -7,7 +7,7 @@ use crate::math::vector::{cross, dot, length};
 use crate::scene::{Camera, Falloff, Light, LightKind, Rgb, Scene, Shape};
 
 /// A model whose faces look inward, like a stage: walls around, open on one side.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Room {
     /// The side that is open, as the azimuth to look from, radians.
     pub azimuth: f64,

@@ -9,7 +9,7 @@ use crate::scene::quantize::byte;
 use crate::scene::{Rgb, Transfer};
 
 /// What happens to texture coordinates outside [0, 1).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Wrap {
     /// The image repeats.
@@ -22,7 +22,7 @@ pub enum Wrap {
 }
 
 /// How texels are read between their centres.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Filter {
     /// The nearest texel.
@@ -69,6 +69,14 @@ impl Texels {
         }
     }
 
+    /// How many there are.
+    pub fn count(&self) -> usize {
+        match self {
+            Self::Srgb8(texels) | Self::Data8(texels) => texels.len(),
+            Self::Linear32(texels) => texels.len(),
+        }
+    }
+
     fn bytes(&self) -> usize {
         match self {
             Self::Srgb8(texels) | Self::Data8(texels) => std::mem::size_of_val::<[_]>(texels),
@@ -85,6 +93,18 @@ pub struct Level {
     /// Height in texels.
     height: u32,
     texels: Texels,
+}
+
+impl Level {
+    /// An image of this size that another one was made from.
+    pub fn new(width: u32, height: u32, texels: Texels) -> Self {
+        Self { width, height, texels }
+    }
+
+    /// Width, height and texels.
+    pub fn parts(&self) -> (u32, u32, &Texels) {
+        (self.width, self.height, &self.texels)
+    }
 }
 
 /// An image and how to read it.

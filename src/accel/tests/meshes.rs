@@ -32,7 +32,10 @@ impl Random {
 }
 
 pub fn mesh(positions: Vec<Vec3>, indices: Vec<[u32; 3]>) -> Arc<TriangleMesh> {
-    TriangleMesh { positions: positions.into(), indices: indices.into(), ..TriangleMesh::default() }.finish().unwrap().into()
+    TriangleMesh { positions: positions.into(), indices: indices.into(), ..TriangleMesh::default() }
+        .finish()
+        .unwrap()
+        .into()
 }
 
 /// Triangles that share nothing.

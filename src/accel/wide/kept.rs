@@ -81,7 +81,10 @@ impl<'a> Links<'a> {
 }
 
 fn has_empty_box(node: &Node, at: usize) -> bool {
-    node.planes.iter().zip(&Node::EMPTY.planes).all(|(own, empty)| own[0][at] == empty[0][at] && own[1][at] == empty[1][at])
+    node.planes
+        .iter()
+        .zip(&Node::EMPTY.planes)
+        .all(|(own, empty)| own[0][at] == empty[0][at] && own[1][at] == empty[1][at])
 }
 
 /// Whether all triangles in leaves are such of the mesh as can be hit.
@@ -99,5 +102,8 @@ fn check_leaves(tree: &Tree, mesh: &TriangleMesh) -> Result<(), String> {
     };
     let is_leaf = |child: &&Child| **child != Child::NONE && child.is_leaf();
     std::iter::once(&tree.root).filter(is_leaf).try_for_each(check)?;
-    tree.nodes.par_iter().with_min_len(TASK).try_for_each(|node| node.children.iter().filter(is_leaf).try_for_each(check))
+    tree.nodes
+        .par_iter()
+        .with_min_len(TASK)
+        .try_for_each(|node| node.children.iter().filter(is_leaf).try_for_each(check))
 }

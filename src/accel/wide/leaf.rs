@@ -114,8 +114,7 @@ impl Leaves {
 
     /// Bytes that searches read: those of the mesh too.
     pub fn bytes_read(&self) -> usize {
-        let arrays =
-            |mesh: &TriangleMesh| mesh.positions.bytes() + mesh.indices.bytes();
+        let arrays = |mesh: &TriangleMesh| mesh.positions.bytes() + mesh.indices.bytes();
         self.bytes() + self.mesh.as_deref().map_or(0, arrays)
     }
 

@@ -87,8 +87,11 @@ pub struct Node {
 
 impl Node {
     /// Without children.
-    pub const EMPTY: Self =
-        Self { planes: [[[f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]]; 3], children: [Child::NONE; WIDTH], unused: [0; 8] };
+    pub const EMPTY: Self = Self {
+        planes: [[[f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]]; 3],
+        children: [Child::NONE; WIDTH],
+        unused: [0; 8],
+    };
 
     /// Sets a child.
     pub fn set(&mut self, at: usize, bounds: &Bounds, child: Child) {

@@ -101,7 +101,13 @@ pub fn parse_with(
     let automatic = reader.read_scene(&Fields::root(&source, table.get_ref()))?;
     let imported_materials = reader.scene.materials.len() - reader.own_materials.len();
     let Reader { scene, ledger, entries, imports_lights, extents, .. } = reader;
-    Ok(Parsed { loaded: Loaded { scene, ledger, automatic }, entries, imported_materials, imports_lights, extents })
+    Ok(Parsed {
+        loaded: Loaded { scene, ledger, automatic, built: None },
+        entries,
+        imported_materials,
+        imports_lights,
+        extents,
+    })
 }
 
 /// What marks the number of an object's material as a position in [`Reader::own_materials`] until all models are read.

@@ -100,7 +100,9 @@ mod tests {
     fn surfaces_are_where_the_objects_stand_and_keep_numbers() {
         let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
         let indices = vec![[0, 1, 2], [0, 0, 1], [0, 9, 1], [1, 2, 3]];
-        let mesh = TriangleMesh { positions: positions.into(), indices: indices.into(), ..TriangleMesh::default() }.finish().unwrap();
+        let mesh = TriangleMesh { positions: positions.into(), indices: indices.into(), ..TriangleMesh::default() }
+            .finish()
+            .unwrap();
         let mut scene = scenes::empty();
         scenes::add_quadric(&mut scene, crate::geometry::shapes::sphere(), DAffine3::IDENTITY, scenes::white());
         let moved = DAffine3::from_translation(DVec3::new(0.0, 0.0, 5.0));

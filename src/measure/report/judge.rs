@@ -248,8 +248,11 @@ mod tests {
         let square = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [1.0, 1.0, 1.0], [0.0, 1.0, 1.0]];
         let behind = [[0.0, 0.0, 2.0], [1.0, 0.0, 2.0], [0.0, 1.0, 2.0]];
         let positions = square.into_iter().chain(behind).map(Vec3::from).collect();
-        let mesh =
-            TriangleMesh { positions, indices: vec![[0, 1, 2], [0, 2, 3], [4, 5, 6]].into(), ..TriangleMesh::default() };
+        let mesh = TriangleMesh {
+            positions,
+            indices: vec![[0, 1, 2], [0, 2, 3], [4, 5, 6]].into(),
+            ..TriangleMesh::default()
+        };
         of_mesh(mesh.finish().unwrap())
     }
 

@@ -18,17 +18,23 @@ impl Fingerprint {
     /// The system's, with the path of a file that cannot be read.
     pub fn of_files<'a>(input: &Path, files: impl IntoIterator<Item = &'a Path>) -> Result<Self> {
         let others = files.into_iter().filter(|path| *path != input);
-        let mut parts = others.map(|path| Ok((own_name(path), content(path)?))).collect::<Result<Vec<_>>>()?;
+        let others = others.map(|path| Ok((path, content(path)?))).collect::<Result<Vec<_>>>()?;
+        Ok(Self::of_contents(content(input)?, others))
+    }
+
+    /// The same where the contents' hashes are known: that of the input, and of the others with their paths.
+    pub fn of_contents<'a>(input: [u8; 32], others: impl IntoIterator<Item = (&'a Path, [u8; 32])>) -> Self {
+        let mut parts: Vec<_> = others.into_iter().map(|(path, content)| (own_name(path), content)).collect();
         parts.sort_unstable();
         parts.dedup();
         let mut all = blake3::Hasher::new();
-        all.update(&content(input)?);
+        all.update(&input);
         for (name, content) in parts {
             all.update(&(name.len() as u64).to_le_bytes());
             all.update(name.as_bytes());
             all.update(&content);
         }
-        Ok(Self(*all.finalize().as_bytes()))
+        Self(*all.finalize().as_bytes())
     }
 }
 
@@ -36,8 +42,11 @@ fn own_name(path: &Path) -> String {
     path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
-/// The hash of a file's content, found by all threads.
-fn content(path: &Path) -> Result<[u8; 32]> {
+/// The BLAKE3 of a file's content, found by all threads.
+///
+/// # Errors
+/// The system's, with the path.
+pub fn content(path: &Path) -> Result<[u8; 32]> {
     let mut hasher = blake3::Hasher::new();
     hasher.update_mmap_rayon(path).map_err(|cause| Error::system(path, cause))?;
     Ok(*hasher.finalize().as_bytes())

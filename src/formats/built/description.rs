@@ -1,0 +1,151 @@
+//! What a built scene says beside its arrays.
+
+use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+use crate::accel;
+use crate::error::{Error, Result};
+use crate::formats::atomic_file::relative_to;
+use crate::formats::fingerprint::{self, Fingerprint};
+use crate::formats::{Ledger, LoadOptions};
+use crate::geometry::mesh::{DroppedCounts, Rounding};
+use crate::geometry::{Bounds, Quadric};
+use crate::scene::auto::Automatic;
+use crate::scene::texture::{Filter, Wrap};
+use crate::scene::{FilmSettings, Light, Material, NamedCamera, Object, Rgb};
+
+/// A scene without its arrays, how it was read, and from what.
+#[derive(Serialize, Deserialize)]
+pub struct Description {
+    pub origin: DVec3,
+    pub ambient: Rgb,
+    pub background: Background,
+    pub cameras: Vec<NamedCamera>,
+    pub active_camera: usize,
+    pub film: FilmSettings,
+    pub lights: Vec<Light>,
+    pub materials: Vec<Material>,
+    pub quadrics: Vec<Quadric>,
+    pub objects: Vec<Object>,
+    pub meshes: Vec<Mesh>,
+    pub textures: Vec<Texture>,
+    pub automatic: Automatic,
+    pub ledger: Ledger,
+    pub options: LoadOptions,
+    pub structure: String,
+    pub preset: accel::Preset,
+    pub scene: Fingerprint,
+    pub sources: Vec<SourceFile>,
+}
+
+/// [`scene::Background`](crate::scene::Background).
+#[derive(Serialize, Deserialize)]
+pub enum Background {
+    Color(Rgb),
+    Gradient { bottom: Rgb, top: Rgb, up: DVec3 },
+    Image { texture: Texture, intensity: f32 },
+    Transparent,
+}
+
+/// A mesh and its tree without their arrays.
+#[derive(Serialize, Deserialize)]
+pub struct Mesh {
+    pub name: String,
+    pub origin: DVec3,
+    pub exponent: i32,
+    /// The material of all triangles, where they have no list.
+    pub material: u32,
+    /// Names and first triangles.
+    pub groups: Vec<(String, u32)>,
+    pub dropped_counts: DroppedCounts,
+    pub rounding: Rounding,
+    pub root: u32,
+    pub bounds: Bounds,
+}
+
+/// An image without its texels.
+#[derive(Serialize, Deserialize)]
+pub struct Texture {
+    pub name: String,
+    pub wrap: [Wrap; 2],
+    pub filter: Filter,
+    /// The image itself and its smaller versions.
+    pub levels: Vec<Level>,
+}
+
+/// The size of an image and the number of its texels' section.
+#[derive(Serialize, Deserialize)]
+pub struct Level {
+    pub width: u32,
+    pub height: u32,
+    pub kind: TexelKind,
+    pub section: u32,
+}
+
+/// [`Texels`](crate::scene::texture::Texels).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum TexelKind {
+    Srgb8,
+    Data8,
+    Linear32,
+}
+
+/// A file that a scene was built from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SourceFile {
+    /// Seen from the folder of the built scene.
+    path: PathBuf,
+    bytes: u64,
+    /// When it was changed last, since 1970; `None` where that was so shortly before the scene was built that a later change may have the
+    /// same time.
+    modified: Option<Duration>,
+    content: [u8; 32],
+}
+
+/// Files whose times are nearer to the present may be changed again without another time.
+const COARSEST_CLOCK: Duration = Duration::from_secs(2);
+
+impl SourceFile {
+    /// A file, for a built scene at `target`.
+    ///
+    /// # Errors
+    /// The system's.
+    pub fn of(path: &Path, target: &Path) -> Result<Self> {
+        let (bytes, modified) = state(path).map_err(|cause| Error::system(path, cause))?;
+        let content = fingerprint::content(path)?;
+        let is_old = |time: &Duration| UNIX_EPOCH.elapsed().is_ok_and(|now| *time + COARSEST_CLOCK < now);
+        Ok(Self { path: relative_to(path, target), bytes, modified: modified.filter(is_old), content })
+    }
+
+    /// The hash of its content.
+    pub fn content(&self) -> [u8; 32] {
+        self.content
+    }
+
+    /// The file, seen from where this process is, if it is there still; a built scene without its sources is whole.
+    ///
+    /// # Errors
+    /// When it has changed.
+    pub fn check(&self, target: &Path) -> Result<Option<PathBuf>> {
+        let path = target.parent().unwrap_or(Path::new("")).join(&self.path);
+        let Ok((bytes, modified)) = state(&path) else { return Ok(None) };
+        let is_same = bytes == self.bytes
+            && ((modified.is_some() && modified == self.modified) || fingerprint::content(&path)? == self.content);
+        if is_same {
+            return Ok(Some(path));
+        }
+        Err(Error::file(format!("`{}` is not what this scene was built from any more", path.display()))
+            .at_path(target)
+            .remedy("build it again with `whitted build`"))
+    }
+}
+
+/// A file's size and the time of its last change, where that is known.
+fn state(path: &Path) -> std::io::Result<(u64, Option<Duration>)> {
+    let metadata = std::fs::metadata(path)?;
+    let modified = metadata.modified().ok().and_then(|time: SystemTime| time.duration_since(UNIX_EPOCH).ok());
+    Ok((metadata.len(), modified))
+}
