@@ -20,12 +20,12 @@ impl Mapping {
     /// Maps a file.
     ///
     /// Nobody may change its bytes or cut it while it is mapped: what is read then is not what was checked, and reading what was cut
-    /// off ends the process. Files that are replaced by a rename, as this program writes all of its own, are safe: the old one stays
-    /// as long as it is mapped.
+    /// off ends the process. A file that is replaced by a rename, as this program writes all of its own, stays as long as it is mapped;
+    /// but not where another machine replaces it in a network file system.
     ///
     /// # Errors
     /// The system's.
-    pub fn of(file: &File) -> io::Result<Self> {
+    pub(crate) fn of(file: &File) -> io::Result<Self> {
         // SAFETY: the map is read-only, and that nobody changes the file is asked of the user above. All types that are read from it
         // have a value for every pattern of bits.
         unsafe { memmap2::Mmap::map(file) }.map(Self)

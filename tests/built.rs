@@ -96,13 +96,16 @@ fn what_does_not_fit_together_is_refused() {
         let message = workshop.fail(arguments);
         told.iter().for_each(|told| assert!(message.contains(told), "{arguments}: {message}"));
     };
-    refused("render scene.whb --up z", &["scene.whb", "say it to `whitted build`"]);
+    refused("render scene.whb --up y", &["scene.whb", "say them to `whitted build`"]);
     refused("render scene.whb --normals smooth", &["scene.whb"]);
+    workshop.succeed("render scene.whb -o a.png --up z --normals file --size 20x10");
     refused("render scene.whb --memory-limit 1K", &["--memory-limit allows 1.0 KiB", "--accelerator compact"]);
     refused("render scene.whb --save-scene a.toml", &["scene.whb", "--save-scene"]);
     refused("build scene.whb -o b.whb", &["scene.whb", "built already"]);
-    refused("build model.obj -o model.obj", &["model.obj", "not overwritten"]);
-    refused("build model.obj -o model.mtl", &["model.mtl", "not overwritten"]);
+    refused("build scene.whb", &["scene.whb", "built already"]);
+    for name in ["model.obj", "model.mtl", "-", "a.glb"] {
+        refused(&format!("build model.obj -o {name}"), &[name, "ends in .whb"]);
+    }
     refused("build model.obj -o scene.whb --no-clobber", &["scene.whb", "--no-clobber"]);
     refused("build model.obj -o a.whb --accelerator bvh2", &["`bvh2` cannot be kept", "wide, compact"]);
     refused("build none.obj", &["none.obj"]);

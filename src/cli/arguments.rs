@@ -181,12 +181,12 @@ pub struct CameraArguments {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Reading")]
 pub struct LoadArguments {
-    /// The axis of a model that points up.
-    #[arg(long, value_name = "AXIS", value_parser = one_of(UP_AXES), default_value = "y")]
-    pub up: UpAxis,
-    /// Shading normals: those of the file, none, or computed from the faces.
-    #[arg(long, value_name = "MODE", value_parser = one_of(NORMAL_MODES), default_value = "file")]
-    pub normals: NormalMode,
+    /// The axis of a model that points up; without it y.
+    #[arg(long, value_name = "AXIS", value_parser = one_of(UP_AXES))]
+    pub up: Option<UpAxis>,
+    /// Shading normals: those of the file, as without it, none, or computed from the faces.
+    #[arg(long, value_name = "MODE", value_parser = one_of(NORMAL_MODES))]
+    pub normals: Option<NormalMode>,
     /// Where an OBJ file has neither normals nor smoothing groups: smooth edges between faces that meet at less than this angle.
     #[arg(long, value_name = "DEGREES", value_parser = values::angle)]
     pub crease_angle: Option<f64>,
@@ -225,9 +225,9 @@ pub struct BuildArguments {
     /// take more, the compact one is built.
     #[arg(long, value_name = "SIZE", value_parser = values::bytes, conflicts_with = "accelerator")]
     pub memory_limit: Option<u64>,
-    /// How much time its build may take for faster rays.
-    #[arg(long, value_name = "PRESET", value_parser = one_of(PRESETS), default_value = "balanced")]
-    pub preset: Preset,
+    /// How much time its build may take for faster rays; without it balanced.
+    #[arg(long, value_name = "PRESET", value_parser = one_of(PRESETS))]
+    pub preset: Option<Preset>,
     /// Number of threads; 0 is one per processor.
     #[arg(long, value_name = "N", value_parser = values::count(0..=MOST_THREADS), default_value_t = 0)]
     pub threads: u32,
@@ -315,8 +315,8 @@ impl LoadArguments {
             limits.by_name().into_iter().filter(|(known, _)| known == name).for_each(|(_, limit)| *limit = *value);
         }
         LoadOptions {
-            normals: self.normals,
-            up: self.up,
+            normals: self.normals.unwrap_or_default(),
+            up: self.up.unwrap_or_default(),
             faces: false,
             crease_angle: self.crease_angle,
             scene: self.scene.clone(),
@@ -339,7 +339,7 @@ impl BuildArguments {
             Kind::Auto => kind_within(self.memory_limit, scene, picture)?,
             kind => kind,
         };
-        Ok(Params { kind, preset: self.preset })
+        Ok(Params { kind, preset: self.preset.unwrap_or_default() })
     }
 }
 

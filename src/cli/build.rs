@@ -1,6 +1,7 @@
 //! `whitted build`, and what other commands do with what it made.
 
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 use clap::{Args, ValueHint};
 
@@ -53,16 +54,21 @@ pub fn run(arguments: &BuildSceneArguments) -> Result<()> {
         None => outputs::named_after(input, ".whb")?,
     };
     outputs::refuse_clobber(&output, *no_clobber)?;
-    outputs::refuse_inputs(&output, [input.as_path()])?;
     if formats::is_built(input)? {
         return Err(Error::caller("this scene is built already").at_path(input));
     }
+    if output.extension().is_none_or(|suffix| suffix != "whb") {
+        let error = Error::caller("the name of a built scene ends in .whb");
+        return Err(error.at_path(&output).remedy("name it so"));
+    }
+    outputs::refuse_inputs(&output, [input.as_path()])?;
     check_writable(&output)?;
     let terminal = Terminal::new(*quiet)?;
     super::use_threads(build.threads)?;
     // Who asks for faces later finds them; they take no room where all are triangles.
     let options = LoadOptions { faces: true, ..load.options() };
     build.refuse_what_does_not_fit(input, &options)?;
+    let since = SystemTime::now();
     let (loaded, load_seconds) = timed(|| formats::open(input, &options, &terminal));
     terminal.clear();
     let Loaded { scene, ledger, automatic, .. } = loaded?;
@@ -74,7 +80,7 @@ pub fn run(arguments: &BuildSceneArguments) -> Result<()> {
     let renderer = Renderer::build(scene, &params, &terminal);
     terminal.clear();
     let renderer = renderer?;
-    let origin = Origin { input, options: &options, ledger: &ledger, automatic, preset: build.preset };
+    let origin = Origin { input, options: &options, since, ledger: &ledger, automatic, preset: params.preset };
     let (bytes, write_seconds) = timed(|| built::save(&renderer, &origin, &output, &terminal));
     terminal.clear();
     let bytes = bytes?;
@@ -89,7 +95,7 @@ pub fn run(arguments: &BuildSceneArguments) -> Result<()> {
     terminal::print(format!("{}\n", output.display()).as_bytes())
 }
 
-/// Opens a scene, a model or a built scene; the last was read with options of its own, so that none may be given.
+/// Opens a scene, a model or a built scene; the last was read with options of its own, and no others may be given.
 ///
 /// # Errors
 /// As [`formats::open`].
@@ -100,12 +106,19 @@ pub fn open_scene(
     progress: &dyn Progress,
 ) -> Result<Loaded> {
     let loaded = formats::open(input, options, progress)?;
-    let given = load.options();
-    let LoadOptions { limits, allow_external, .. } = given;
-    if loaded.built.is_some() && given != (LoadOptions { limits, allow_external, ..LoadOptions::default() }) {
-        return Err(Error::caller("this scene is built: how its files are read was said then")
+    let Some(built) = &loaded.built else { return Ok(loaded) };
+    let own = &built.options;
+    let is_other = load.normals.is_some_and(|normals| normals != own.normals)
+        || load.up.is_some_and(|up| up != own.up)
+        || (load.crease_angle.is_some() && load.crease_angle != own.crease_angle)
+        || (load.scene.is_some() && load.scene != own.scene)
+        || (load.animation.is_some() && load.animation != own.animation)
+        || (load.time.is_some() && load.time != own.time)
+        || (load.cull_back_faces && !own.cull_back_faces);
+    if is_other {
+        return Err(Error::caller("this scene was built with other flags of reading")
             .at_path(input)
-            .remedy("say it to `whitted build`"));
+            .remedy("leave them out, or say them to `whitted build`"));
     }
     Ok(loaded)
 }
@@ -128,7 +141,7 @@ impl<'a> Plan<'a> {
         let BuildArguments { accelerator, preset, memory_limit, .. } = *arguments;
         let Some(built) = built else { return Ok(Self::Build(arguments.params(scene, picture)?)) };
         let is_kind = accelerator == Kind::Auto || accelerator == built.kind;
-        if !(is_kind && (preset == Preset::default() || preset == built.preset)) {
+        if !(is_kind && preset.is_none_or(|preset| preset == built.preset)) {
             return Ok(Self::Build(arguments.params(scene, picture)?));
         }
         let needed = built.bytes + picture;
@@ -151,14 +164,22 @@ impl<'a> Plan<'a> {
         }
     }
 
+    /// How they are or were built.
+    pub fn preset(&self) -> Preset {
+        match self {
+            Self::Build(params) => params.preset,
+            Self::Restore(built) => built.preset,
+        }
+    }
+
     /// The renderer.
     ///
     /// # Errors
-    /// As [`Renderer::build`] and [`Renderer::restore`].
+    /// As [`Renderer::build`] and [`Built::renderer`].
     pub fn renderer(&self, scene: Scene, progress: &dyn Progress) -> Result<Renderer> {
         match self {
             Self::Build(params) => Renderer::build(scene, params, progress),
-            Self::Restore(built) => Renderer::restore(scene, built.kind, &built.trees, progress),
+            Self::Restore(built) => built.renderer(scene, progress),
         }
     }
 }

@@ -54,7 +54,6 @@ const OUT_OF_TIME: u8 = 75;
 /// # Errors
 /// Whatever stopped it; [`Fault::Cancelled`] after an interrupt.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    keep_freed_memory();
     if let Some(name) = Level::refused() {
         let known: Vec<_> = Level::available().map(Level::name).collect();
         let known = known.join(", ");
@@ -77,22 +76,6 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         Command::Completions { shell } => completions::run(*shell),
     }
 }
-
-/// Lets the allocator keep some of what is freed. A batch of rays frees and takes some hundred kilobytes, which glibc returns to the system
-/// each time, and which the system clears, until something large was freed: then glibc sets these limits itself. Of a scene that is small, or
-/// mapped, nothing large is ever freed. A dragon of 871 k triangles that was built before is rendered 1.15 to 1.2 times as fast with this.
-#[cfg(all(target_os = "linux", target_env = "gnu"))]
-#[allow(unsafe_code)]
-fn keep_freed_memory() {
-    // SAFETY: it sets two numbers.
-    unsafe {
-        libc::mallopt(libc::M_MMAP_THRESHOLD, 32 << 20);
-        libc::mallopt(libc::M_TRIM_THRESHOLD, 64 << 20);
-    }
-}
-
-#[cfg(not(all(target_os = "linux", target_env = "gnu")))]
-fn keep_freed_memory() {}
 
 /// Reports an error in one line on standard error and says what the process ends with: 0, 1, 75 or 130.
 pub fn exit_code(result: Result<()>) -> ExitCode {

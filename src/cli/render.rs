@@ -11,6 +11,7 @@ use super::precision::{AnyRenderer, Precision};
 use super::stats_json::{Bytes, SCHEMA, Seconds, Settings, Stats, timed};
 use super::terminal::{self, Terminal};
 use super::{camera, job, outputs};
+use crate::accel::Preset;
 use crate::error::{Error, Result};
 use crate::formats::atomic_file::sync;
 use crate::formats::reach::PixelCounts;
@@ -30,8 +31,13 @@ pub fn run(arguments: &RenderArguments) -> Result<()> {
         terminal::set_time_limit(limit);
     }
     let outputs = Outputs::plan(arguments)?;
-    if outputs.scene.is_some() && (formats::is_scene(&arguments.input)? || formats::is_built(&arguments.input)?) {
-        return Err(Error::caller("this is a scene already; only what was chosen for a model can be saved")
+    if outputs.scene.is_some() && formats::is_built(&arguments.input)? {
+        return Err(Error::unsupported("a built scene cannot be saved as a scene file")
+            .at_path(&arguments.input)
+            .remedy("say --save-scene with the model that it was built from"));
+    }
+    if outputs.scene.is_some() && formats::is_scene(&arguments.input)? {
+        return Err(Error::caller("this is a scene file already; only what was chosen for a model can be saved")
             .at_path(&arguments.input)
             .remedy("leave out --save-scene"));
     }
@@ -97,8 +103,18 @@ pub fn run(arguments: &RenderArguments) -> Result<()> {
     let renderer = renderer?;
     report_time(arguments, "build", seconds.build);
 
-    let mut work =
-        Work { arguments, ledger, settings, header, camera, automatic, renderer, seconds, terminal: &terminal };
+    let mut work = Work {
+        arguments,
+        ledger,
+        settings,
+        preset: plan.preset(),
+        header,
+        camera,
+        automatic,
+        renderer,
+        seconds,
+        terminal: &terminal,
+    };
     pictures.iter().try_for_each(|(frame, outputs)| work.picture(*frame, outputs))
 }
 
@@ -107,6 +123,8 @@ struct Work<'a> {
     arguments: &'a RenderArguments,
     ledger: Ledger,
     settings: RenderSettings,
+    /// How the trees were built.
+    preset: Preset,
     /// Without a frame and a share.
     header: Option<Header>,
     /// The camera, and how it moves.
@@ -121,7 +139,7 @@ struct Work<'a> {
 impl Work<'_> {
     /// Renders one picture, or a share of it, and writes all that belongs to it.
     fn picture(&mut self, frame: Option<i32>, outputs: &Outputs) -> Result<()> {
-        let Self { arguments, ledger, settings, header, camera, automatic, renderer, seconds, terminal } = self;
+        let Self { arguments, ledger, settings, header, camera, automatic, renderer, seconds, terminal, .. } = self;
         if let Some(frame) = frame {
             let camera = camera.in_frame(frame);
             renderer.look_through(camera);
@@ -171,7 +189,7 @@ impl Work<'_> {
 
     /// Rays, times and memory as JSON.
     fn stats(&self, film: &Film, outputs: &Outputs) -> String {
-        let Self { arguments, settings, renderer, seconds, .. } = self;
+        let Self { arguments, settings, preset, renderer, seconds, .. } = self;
         let scene = renderer.scene();
         let build = renderer.build_stats();
         let stats = Stats {
@@ -186,7 +204,7 @@ impl Work<'_> {
                 aov: &settings.aovs,
                 precision: arguments.precision,
                 accelerator: &build.accelerator,
-                preset: arguments.build.preset,
+                preset: *preset,
                 threads: film.stats.threads,
             },
             rays: film.stats.rays.into(),

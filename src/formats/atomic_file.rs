@@ -13,14 +13,27 @@ impl<T: Write + Seek> Sink for T {}
 /// Writes a file by `write` such that a reader never sees a part of it.
 ///
 /// The content goes to a temporary file in the same folder, which takes the place of `path` once all is there; if
-/// `write` fails, `path` stays as it was. What a process leaves that is killed meanwhile, the next one takes that writes the
-/// same file. The file gets the permissions of any newly created file. A link is followed.
+/// `write` fails, `path` stays as it was. Where the system has files without names, as Linux has on most file systems, nothing
+/// is left by a process that is killed meanwhile. The file gets the permissions of any newly created file. A link is followed.
 /// What is no regular file (a device, a pipe), or an open one by its number (`/dev/stdout`, `/dev/fd/3`), cannot be
 /// replaced: the finished content is appended to it.
 ///
 /// # Errors
 /// Those of `write`, and the system's, with the path.
 pub fn write_atomically(path: &Path, write: impl FnOnce(&mut dyn Sink) -> Result<()>) -> Result<()> {
+    write_whole(path, false, write)
+}
+
+/// [`write_atomically`], with the content brought to the disk before it takes the old one's place, and its name afterwards: also after a
+/// power cut there is the old file or the new one.
+///
+/// # Errors
+/// As `write_atomically`.
+pub fn write_durably(path: &Path, write: impl FnOnce(&mut dyn Sink) -> Result<()>) -> Result<()> {
+    write_whole(path, true, write)
+}
+
+fn write_whole(path: &Path, durably: bool, write: impl FnOnce(&mut dyn Sink) -> Result<()>) -> Result<()> {
     let system = |cause| Error::system(path, cause);
     match fs::metadata(path) {
         Ok(existing) if existing.is_dir() => return Err(is_a_folder(path)),
@@ -38,8 +51,12 @@ pub fn write_atomically(path: &Path, write: impl FnOnce(&mut dyn Sink) -> Result
     let (target, temporary) = temporary_for(path)?;
     let mut buffered = BufWriter::new(temporary);
     write(&mut buffered).map_err(|error| error.at_path(path))?;
-    let temporary = buffered.into_inner().map_err(|failed| system(failed.into_error()))?;
-    temporary.persist(&target).map_err(system)
+    let mut temporary = buffered.into_inner().map_err(|failed| system(failed.into_error()))?;
+    if durably {
+        temporary.file().sync_all().map_err(system)?;
+    }
+    temporary.persist(&target).map_err(system)?;
+    if durably { sync_folder(&target) } else { Ok(()) }
 }
 
 /// Finds out whether [`write_atomically`] could write a file, without touching it.
@@ -61,12 +78,25 @@ pub fn check_writable(path: &Path) -> Result<()> {
 pub fn sync(path: &Path) -> Result<()> {
     let system = |cause| Error::system(path, cause);
     fs::File::open(path).and_then(|file| file.sync_all()).map_err(system)?;
-    #[cfg(unix)]
-    {
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        fs::File::open(folder).and_then(|folder| folder.sync_all()).map_err(system)?;
-    }
+    sync_folder(path)
+}
+
+/// Brings the names in a file's folder to the disk.
+#[cfg(unix)]
+fn sync_folder(path: &Path) -> Result<()> {
+    let synced = fs::File::open(folder_of(path)).and_then(|folder| folder.sync_all());
+    synced.map_err(|cause| Error::system(path, cause))
+}
+
+/// Elsewhere folders cannot be opened.
+#[cfg(not(unix))]
+fn sync_folder(_: &Path) -> Result<()> {
     Ok(())
+}
+
+/// The folder that a file is in, as its path says.
+pub fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// Whether a path leads to what this process has open already, by its number.
@@ -76,7 +106,7 @@ fn is_descriptor(path: &Path) -> bool {
     let Ok(descriptors) = fs::canonicalize("/dev/fd") else { return false };
     let mut path = path.to_path_buf();
     for _ in 0..MOST_LINKS {
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let folder = folder_of(&path);
         if fs::canonicalize(folder).is_ok_and(|folder| folder == descriptors) {
             return true;
         }
@@ -93,8 +123,8 @@ fn is_a_folder(path: &Path) -> Error {
 /// Where a file really is, links followed, and a temporary file in the same folder.
 fn temporary_for(path: &Path) -> Result<(PathBuf, Temporary)> {
     let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
-    let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let temporary = Temporary::create(folder, &target).map_err(|cause| match cause.kind() {
+    let folder = folder_of(&target);
+    let temporary = Temporary::create(folder).map_err(|cause| match cause.kind() {
         io::ErrorKind::NotFound => {
             Error::caller(format!("there is no folder `{}`", folder.display())).at_path(path).remedy("create it first")
         }
@@ -107,39 +137,72 @@ fn temporary_for(path: &Path) -> Result<(PathBuf, Temporary)> {
 /// A file that goes away unless it takes another's place.
 #[derive(Debug)]
 enum Temporary {
-    /// One whose name says what it is for, held by a lock.
-    Named(named::Held),
-    /// One of any name, where there are no such, or another process holds it.
-    Any(tempfile::NamedTempFile),
+    /// One without a name, which goes away with the process, however that ends; and the folder that it is in.
+    #[cfg(target_os = "linux")]
+    Nameless(fs::File, PathBuf),
+    /// One of any name.
+    Named(tempfile::NamedTempFile),
 }
 
 impl Temporary {
-    fn create(folder: &Path, target: &Path) -> io::Result<Self> {
-        if let Some(held) = named::Held::take(folder, target) {
-            return Ok(Self::Named(held));
+    fn create(folder: &Path) -> io::Result<Self> {
+        #[cfg(target_os = "linux")]
+        if let Some(file) = nameless(folder) {
+            return Ok(Self::Nameless(file, folder.to_path_buf()));
         }
+        Self::builder().tempfile_in(folder).map(Self::Named)
+    }
+
+    fn builder() -> tempfile::Builder<'static, 'static> {
         let mut builder = tempfile::Builder::new();
         builder.prefix(".whitted-").suffix(".tmp");
         // The permissions that the umask leaves of a normal file's, not the owner's alone.
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-        builder.tempfile_in(folder).map(Self::Any)
+        builder
     }
 
     /// Takes the place of a file.
     fn persist(self, target: &Path) -> io::Result<()> {
         match self {
-            Self::Named(held) => held.persist(target),
-            Self::Any(file) => file.persist(target).map(drop).map_err(|failed| failed.error),
+            #[cfg(target_os = "linux")]
+            Self::Nameless(file, folder) => {
+                // A name that nothing has, for the moment until it gets its own.
+                let named = Self::builder().make_in(folder, |path| give_name(&file, path))?;
+                named.persist(target).map(drop).map_err(|failed| failed.error)
+            }
+            Self::Named(file) => file.persist(target).map(drop).map_err(|failed| failed.error),
         }
     }
 
     fn file(&mut self) -> &mut fs::File {
         match self {
-            Self::Named(held) => held.file(),
-            Self::Any(file) => file.as_file_mut(),
+            #[cfg(target_os = "linux")]
+            Self::Nameless(file, _) => file,
+            Self::Named(file) => file.as_file_mut(),
         }
     }
+}
+
+/// A file without a name in a folder; `None` where the file system has no such, or they could not be given one.
+#[cfg(target_os = "linux")]
+fn nameless(folder: &Path) -> Option<fs::File> {
+    use std::os::unix::fs::OpenOptionsExt;
+    let file = fs::OpenOptions::new().read(true).write(true).custom_flags(libc::O_TMPFILE).open(folder).ok()?;
+    fs::symlink_metadata(way_to(&file)).is_ok().then_some(file)
+}
+
+/// Where the system shows an open file.
+#[cfg(target_os = "linux")]
+fn way_to(file: &fs::File) -> PathBuf {
+    use std::os::fd::AsRawFd;
+    format!("/proc/self/fd/{}", file.as_raw_fd()).into()
+}
+
+#[cfg(target_os = "linux")]
+fn give_name(file: &fs::File, path: &Path) -> io::Result<()> {
+    use rustix::fs::{AtFlags, CWD, linkat};
+    Ok(linkat(CWD, way_to(file), CWD, path, AtFlags::SYMLINK_FOLLOW)?)
 }
 
 impl Write for Temporary {
@@ -158,73 +221,6 @@ impl Seek for Temporary {
     }
 }
 
-/// Temporary files that the next process finds by their names, should one be killed.
-mod named {
-    use std::fs::{File, OpenOptions};
-    use std::io;
-    use std::path::{Path, PathBuf};
-
-    /// A temporary file that no other process has.
-    #[derive(Debug)]
-    pub struct Held {
-        file: File,
-        /// `None` once it took its place.
-        path: Option<PathBuf>,
-    }
-
-    impl Held {
-        /// Takes the file for a target, new or left by a process that was killed. `None` where another one holds it, or it is not
-        /// a file that this process may write to.
-        #[cfg(target_os = "linux")]
-        pub fn take(folder: &Path, target: &Path) -> Option<Self> {
-            use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
-            let mut name = std::ffi::OsString::from(".whitted-");
-            name.push(target.file_name()?);
-            name.push(".tmp");
-            let path = folder.join(name);
-            // A link that someone else has put there is not followed.
-            let mut options = OpenOptions::new();
-            options.read(true).write(true).create(true).truncate(false).custom_flags(libc::O_NOFOLLOW);
-            let file = options.open(&path).ok()?;
-            file.try_lock().ok()?;
-            // Another process may have given it its place, or deleted it, before it was locked.
-            let (own, there) = (file.metadata().ok()?, std::fs::symlink_metadata(&path).ok()?);
-            let is_there = (own.dev(), own.ino()) == (there.dev(), there.ino());
-            if !(is_there && own.is_file() && own.nlink() == 1) {
-                return None;
-            }
-            // The file is ours alone from here on, and goes away with this.
-            let held = Self { file, path: Some(path) };
-            held.file.set_len(0).ok()?;
-            Some(held)
-        }
-
-        /// Elsewhere open files cannot take another's place.
-        #[cfg(not(target_os = "linux"))]
-        pub fn take(_: &Path, _: &Path) -> Option<Self> {
-            None
-        }
-
-        /// Takes the place of a file.
-        pub fn persist(mut self, target: &Path) -> io::Result<()> {
-            let path = self.path.take().expect("it takes its place once");
-            std::fs::rename(&path, target).inspect_err(|_| drop(std::fs::remove_file(&path)))
-        }
-
-        pub fn file(&mut self) -> &mut File {
-            &mut self.file
-        }
-    }
-
-    impl Drop for Held {
-        fn drop(&mut self) {
-            if let Some(path) = self.path.take() {
-                let _ = std::fs::remove_file(path);
-            }
-        }
-    }
-}
-
 /// The cause of a failed operation on a temporary file, without that file's name.
 fn plain(cause: &std::io::Error) -> String {
     cause
@@ -232,11 +228,13 @@ fn plain(cause: &std::io::Error) -> String {
         .map_or_else(|| cause.kind().to_string(), |code| std::io::Error::from_raw_os_error(code).to_string())
 }
 
-/// `path` as seen from the folder of `file`, where that is possible; separators are `/`.
+/// `path` as seen from the folder of `file`, where that is possible; separators are `/`. Of links, folders are followed and the file
+/// itself is not.
 pub fn relative_to(path: &Path, file: &Path) -> PathBuf {
     let absolute = |path: &Path| fs::canonicalize(path).or_else(|_| std::path::absolute(path));
-    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let (Ok(path_there), Ok(folder)) = (absolute(path), absolute(folder)) else { return path.to_path_buf() };
+    let with_name = |folder: PathBuf| path.file_name().map(|name| folder.join(name));
+    let Some(path_there) = absolute(folder_of(path)).ok().and_then(with_name) else { return path.to_path_buf() };
+    let Ok(folder) = absolute(folder_of(file)) else { return path.to_path_buf() };
     let shared = path_there.components().zip(folder.components()).take_while(|(a, b)| a == b).count();
     // Different drives have no way between them.
     if shared == 0 {
@@ -270,40 +268,24 @@ mod tests {
 
     #[cfg(target_os = "linux")]
     #[test]
-    fn what_a_killed_process_left_is_taken_and_what_another_holds_is_not() {
+    fn nothing_has_a_name_before_it_is_whole() {
         let folder = tempfile::tempdir().unwrap();
+        let names = || fs::read_dir(folder.path()).unwrap().count();
+        if nameless(folder.path()).is_none() {
+            return eprintln!("skipped: this file system has no files without names");
+        }
         let path = folder.path().join("a.txt");
-        let left = folder.path().join(".whitted-a.txt.tmp");
-        let write = || {
-            write_atomically(&path, |sink| sink.write_all(b"new").map_err(|cause| Error::system(Path::new("x"), cause)))
-        };
-        let names = || {
-            let mut names: Vec<_> =
-                fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
-            names.sort();
-            names
-        };
-        fs::write(&left, "longer than what is new").unwrap();
-        write().unwrap();
-        assert_eq!((fs::read_to_string(&path).unwrap().as_str(), names()), ("new", vec!["a.txt".into()]));
-        fs::write(&left, "").unwrap();
+        for (content, before) in [("first", 0), ("second", 1)] {
+            let write = |sink: &mut dyn Sink| {
+                sink.write_all(content.as_bytes()).unwrap();
+                assert_eq!(names(), before);
+                Ok(())
+            };
+            if before == 0 { write_atomically(&path, write) } else { write_durably(&path, write) }.unwrap();
+            assert_eq!((fs::read_to_string(&path).unwrap().as_str(), names()), (content, 1));
+        }
         check_writable(&path).unwrap();
-        assert_eq!(names(), ["a.txt"]);
-        // Another process has it.
-        let other = fs::File::create(&left).unwrap();
-        other.lock().unwrap();
-        write().unwrap();
-        assert_eq!(names(), [".whitted-a.txt.tmp", "a.txt"]);
-        drop(other);
-        // Links lead elsewhere.
-        fs::remove_file(&left).unwrap();
-        fs::write(folder.path().join("b"), "other").unwrap();
-        std::os::unix::fs::symlink("b", &left).unwrap();
-        write().unwrap();
-        fs::remove_file(&left).unwrap();
-        fs::hard_link(folder.path().join("b"), &left).unwrap();
-        write().unwrap();
-        assert_eq!(fs::read_to_string(folder.path().join("b")).unwrap(), "other");
+        assert_eq!(names(), 1);
     }
 
     #[cfg(unix)]

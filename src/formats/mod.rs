@@ -107,7 +107,7 @@ pub struct Loaded {
 }
 
 /// Formats that [`open`] reads, for messages.
-const ACCEPTED: &str = "accepted are .toml (scene), .obj, .gltf and .glb (models), and .whb (built scene)";
+const ACCEPTED: &str = "accepted are .toml (scene), .obj, .gltf and .glb (models) and .whb (built scene)";
 
 /// Formats of scenes and models.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -147,7 +147,7 @@ impl<A: TriangleAccelerator> TwoLevel<A> {
     /// Builds the trees of all meshes that are not `ready`, and the top level. Advances by one step a live triangle.
     ///
     /// # Errors
-    /// A singular transform; a cancellation; trees that are no trees of the scene's meshes.
+    /// A singular transform, or one that leads too far; a cancellation; trees that are no trees of the scene's meshes.
     pub fn build(scene: &Scene, ready: &Ready<'_, A>, params: &Params, progress: &dyn Progress) -> Result<Self> {
         let (world, meshes) = match *ready {
             Ready::Nothing => (World::new(scene)?, Self::build_meshes(scene, None, params, progress)?),
@@ -161,6 +161,12 @@ impl<A: TriangleAccelerator> TwoLevel<A> {
             }
         };
         let instances = &world.instances;
+        let is_held = |bounds: &Bounds| bounds.is_empty() || (bounds.min.is_finite() && bounds.max.is_finite());
+        if let Some(far) = instances.iter().position(|instance| !instance.bounds.as_ref().is_none_or(is_held)) {
+            let name = &scene.objects[far].name;
+            return Err(Error::caller(format!("object `{name}` reaches beyond what numbers hold"))
+                .remedy("bring it nearer to the origin, or make it smaller"));
+        }
         let single = matches!(instances.as_slice(), [one] if one.identity && one.shape == Shape::Mesh(0));
         let top = if single {
             Top::Single

@@ -50,6 +50,7 @@ pub fn ray_tracing<I: Answers>(
         .build()
         .map_err(|cause| Error::limit(format!("cannot start {} threads: {cause}", settings.threads)))?;
 
+    keep_freed_memory();
     let counter = settings.coverage.then(|| Counter::new(scene));
     let wanted: Vec<(u32, Crop)> = match &settings.tiles {
         None => (0..tiles.count()).filter_map(|number| Some((number, tiles.tile(number)?))).collect(),
@@ -76,6 +77,15 @@ pub fn ray_tracing<I: Answers>(
     let ThreadSeconds { traversal, shading, rest } = &mut picture.stats.thread_seconds;
     *rest = (seconds * picture.stats.threads as f64 - *traversal - *shading).max(0.0);
     Ok(picture)
+}
+
+/// Lets the allocator keep what threads free. A batch of rays takes and frees some hundred kilobytes, which glibc returns to the system each time,
+/// and which the system then clears, until something large is freed: from then on glibc keeps twice as much. Of a scene that is small, or mapped,
+/// nothing large ever is; a dragon of 871 k triangles in a mapped file is rendered 1.2 times as fast with this.
+fn keep_freed_memory() {
+    /// A little less than the largest that glibc learns from.
+    const LARGE: usize = 31 << 20;
+    drop(std::hint::black_box(Vec::<u8>::with_capacity(LARGE)));
 }
 
 /// Renders one tile; `None` once the work is cancelled.

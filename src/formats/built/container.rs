@@ -20,10 +20,12 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use super::AGAIN;
 use crate::array::{Array, Mapping};
 use crate::error::{Error, Result};
 use crate::progress::Progress;
 
+/// With a number that is another one wherever sections or the description are: a test tells when.
 const MAGIC: &[u8; 16] = b"whitted built 1\n";
 /// What all versions of the format begin with.
 const FAMILY: &[u8] = b"whitted built ";
@@ -189,8 +191,7 @@ impl Container {
         let file = std::fs::File::open(path).map_err(|cause| Error::system(path, cause))?;
         let mapping = Mapping::of(&file).map_err(|cause| Error::system(path, cause))?;
         let bytes = mapping.bytes();
-        let again = "build it again with `whitted build`";
-        let flawed = |what: String| Error::file(what).at_path(path).remedy(again);
+        let flawed = |what: String| Error::file(what).at_path(path).remedy(AGAIN);
         if !bytes.starts_with(MAGIC) {
             return Err(match is_built(bytes) {
                 true => flawed("this scene was built in another version of the format".into()),
@@ -273,7 +274,7 @@ impl Container {
                     range.start,
                     range.end
                 );
-                Err(Error::file(what).at_path(&self.path).remedy("build it again with `whitted build`"))
+                Err(Error::file(what).at_path(&self.path).remedy(AGAIN))
             }
         }
     }
@@ -281,6 +282,12 @@ impl Container {
     /// Where a section is.
     pub fn range(&self, kind: Kind, item: u32) -> Option<Range<usize>> {
         self.by_content.get(&(kind, item)).map(|&at| self.entries[at].range.clone())
+    }
+
+    /// All sections.
+    #[cfg(test)]
+    pub fn sections(&self) -> impl Iterator<Item = (Kind, u32, Range<usize>)> + '_ {
+        self.entries.iter().map(|entry| (entry.kind, entry.item, entry.range.clone()))
     }
 
     /// The bytes of a section.

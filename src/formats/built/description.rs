@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::accel;
 use crate::error::{Error, Result};
-use crate::formats::atomic_file::relative_to;
+use crate::formats::atomic_file::{folder_of, relative_to};
 use crate::formats::fingerprint::{self, Fingerprint};
 use crate::formats::{Ledger, LoadOptions};
 use crate::geometry::mesh::{DroppedCounts, Rounding};
@@ -97,7 +97,7 @@ pub enum TexelKind {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SourceFile {
     /// Seen from the folder of the built scene.
-    path: PathBuf,
+    path: RawPath,
     bytes: u64,
     /// When it was changed last, since 1970; `None` where that was so shortly before the scene was built that a later change may have the
     /// same time.
@@ -109,15 +109,23 @@ pub struct SourceFile {
 const COARSEST_CLOCK: Duration = Duration::from_secs(2);
 
 impl SourceFile {
-    /// A file, for a built scene at `target`.
+    /// A file that was read after a moment, for a built scene at `target`.
     ///
     /// # Errors
-    /// The system's.
-    pub fn of(path: &Path, target: &Path) -> Result<Self> {
-        let (bytes, modified) = state(path).map_err(|cause| Error::system(path, cause))?;
+    /// A file that was changed since; the system's.
+    pub fn of(path: &Path, since: SystemTime, target: &Path) -> Result<Self> {
+        let system = |cause| Error::system(path, cause);
+        let (bytes, modified) = state(path).map_err(system)?;
         let content = fingerprint::content(path)?;
+        let since = since.duration_since(UNIX_EPOCH).unwrap_or_default();
+        if modified.is_some_and(|modified| modified >= since) || state(path).map_err(system)? != (bytes, modified) {
+            return Err(Error::file("the file was changed while the scene was built")
+                .at_path(path)
+                .remedy("build it again"));
+        }
         let is_old = |time: &Duration| UNIX_EPOCH.elapsed().is_ok_and(|now| *time + COARSEST_CLOCK < now);
-        Ok(Self { path: relative_to(path, target), bytes, modified: modified.filter(is_old), content })
+        let path = RawPath::of(&relative_to(path, target));
+        Ok(Self { path, bytes, modified: modified.filter(is_old), content })
     }
 
     /// The hash of its content.
@@ -130,22 +138,54 @@ impl SourceFile {
     /// # Errors
     /// When it has changed.
     pub fn check(&self, target: &Path) -> Result<Option<PathBuf>> {
-        let path = target.parent().unwrap_or(Path::new("")).join(&self.path);
-        let Ok((bytes, modified)) = state(&path) else { return Ok(None) };
-        let is_same = bytes == self.bytes
+        let target = std::fs::canonicalize(target).unwrap_or_else(|_| target.to_path_buf());
+        let path = folder_of(&target).join(self.path.path());
+        let Ok(metadata) = std::fs::metadata(&path) else { return Ok(None) };
+        let (bytes, modified) = state_of(&metadata);
+        let is_same = metadata.is_file()
+            && bytes == self.bytes
             && ((modified.is_some() && modified == self.modified) || fingerprint::content(&path)? == self.content);
         if is_same {
             return Ok(Some(path));
         }
         Err(Error::file(format!("`{}` is not what this scene was built from any more", path.display()))
-            .at_path(target)
-            .remedy("build it again with `whitted build`"))
+            .at_path(&target)
+            .remedy("build it again with `whitted build`, or, if that is another file, move one of them"))
     }
 }
 
 /// A file's size and the time of its last change, where that is known.
 fn state(path: &Path) -> std::io::Result<(u64, Option<Duration>)> {
-    let metadata = std::fs::metadata(path)?;
+    Ok(state_of(&std::fs::metadata(path)?))
+}
+
+fn state_of(metadata: &std::fs::Metadata) -> (u64, Option<Duration>) {
     let modified = metadata.modified().ok().and_then(|time: SystemTime| time.duration_since(UNIX_EPOCH).ok());
-    Ok((metadata.len(), modified))
+    (metadata.len(), modified)
+}
+
+/// A path as the system has it, which need not be text.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct RawPath(Vec<u8>);
+
+impl RawPath {
+    #[cfg(unix)]
+    fn of(path: &Path) -> Self {
+        Self(std::os::unix::ffi::OsStrExt::as_bytes(path.as_os_str()).to_vec())
+    }
+
+    #[cfg(unix)]
+    fn path(&self) -> PathBuf {
+        PathBuf::from(<std::ffi::OsStr as std::os::unix::ffi::OsStrExt>::from_bytes(&self.0))
+    }
+
+    #[cfg(not(unix))]
+    fn of(path: &Path) -> Self {
+        Self(path.to_string_lossy().into_owned().into_bytes())
+    }
+
+    #[cfg(not(unix))]
+    fn path(&self) -> PathBuf {
+        PathBuf::from(String::from_utf8_lossy(&self.0).into_owned())
+    }
 }

@@ -12,14 +12,14 @@ mod tests;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Instant, SystemTime};
 
 use container::{Container, Section};
 use description::{Description, SourceFile, TexelKind};
 
 use crate::accel::{KeptTree, Kind, Preset};
-use crate::error::{Error, Result};
-use crate::formats::atomic_file::{sync, write_atomically};
+use crate::error::{Error, Fault, Result};
+use crate::formats::atomic_file::write_durably;
 use crate::formats::fingerprint::Fingerprint;
 use crate::formats::{Ledger, LoadOptions, Loaded};
 use crate::geometry::TriangleMesh;
@@ -31,6 +31,9 @@ use crate::scene::texture::{Level, Texels};
 use crate::scene::{Background, Scene, Texture};
 
 pub use container::is_built;
+
+/// What helps where a file is damaged or old.
+const AGAIN: &str = "build it again with `whitted build`";
 
 /// What a file of a built scene has beside the scene.
 #[derive(Debug, Clone)]
@@ -47,7 +50,9 @@ pub struct Built {
     pub fingerprint: Fingerprint,
     /// Those of them that are still there.
     pub sources: Vec<PathBuf>,
-    /// Bytes of the file.
+    /// The file.
+    pub path: PathBuf,
+    /// Its bytes.
     pub bytes: u64,
     /// Seconds that checking them took.
     pub check_seconds: f64,
@@ -60,12 +65,26 @@ pub struct Origin<'a> {
     pub input: &'a Path,
     /// How.
     pub options: &'a LoadOptions,
+    /// When reading began.
+    pub since: SystemTime,
     /// What was met, and which files were read.
     pub ledger: &'a Ledger,
     /// What the scene lacked and was given.
     pub automatic: Automatic,
     /// How the trees were built.
     pub preset: Preset,
+}
+
+impl Built {
+    /// The renderer of the scene, which was read with this.
+    ///
+    /// # Errors
+    /// As [`Renderer::restore`], with the file.
+    pub fn renderer(&self, scene: Scene, progress: &dyn Progress) -> Result<Renderer> {
+        let renderer = Renderer::restore(scene, self.kind, &self.trees, progress);
+        renderer
+            .map_err(|error| if error.fault() == Fault::File { error.at_path(&self.path).remedy(AGAIN) } else { error })
+    }
 }
 
 /// Whether structures of a kind can be kept.
@@ -84,14 +103,14 @@ pub fn check_kind(kind: Kind) -> Result<()> {
 /// Writes a scene and its trees to a file, whole or not at all, and returns its bytes. Each byte of them is two steps.
 ///
 /// # Errors
-/// A structure that cannot be kept; sources that cannot be read again; the system's; a cancellation.
+/// A structure that cannot be kept; sources that were changed since, or cannot be read again; the system's; a cancellation.
 pub fn save(renderer: &Renderer, origin: &Origin<'_>, path: &Path, progress: &dyn Progress) -> Result<u64> {
     check_kind(renderer.kind())?;
     let trees = renderer.arrays().expect("structures of such a kind have arrays");
     let scene = renderer.scene();
     let files: Vec<&Path> = origin.ledger.files().filter(|file| *file != origin.input).collect();
-    let input = SourceFile::of(origin.input, path)?;
-    let others = files.iter().map(|file| SourceFile::of(file, path)).collect::<Result<Vec<_>>>()?;
+    let input = SourceFile::of(origin.input, origin.since, path)?;
+    let others = files.iter().map(|file| SourceFile::of(file, origin.since, path)).collect::<Result<Vec<_>>>()?;
     let fingerprint = Fingerprint::of_contents(
         input.content(),
         files.iter().zip(&others).map(|(file, source)| (*file, source.content())),
@@ -163,11 +182,10 @@ pub fn save(renderer: &Renderer, origin: &Origin<'_>, path: &Path, progress: &dy
     let description = postcard::to_stdvec(&description).expect("lists of names and numbers can be written");
     sections.insert(0, Section { kind: container::Kind::Description, item: 0, bytes: &description });
     let mut bytes = 0;
-    write_atomically(path, |sink| {
+    write_durably(path, |sink| {
         bytes = container::write(sink, path, &sections, progress)?;
         Ok(())
     })?;
-    sync(path)?;
     Ok(bytes)
 }
 
@@ -237,10 +255,9 @@ pub fn open(path: &Path, progress: &dyn Progress) -> Result<Loaded> {
     let bytes = container.mapping.bytes().len() as u64;
     let description = container.bytes(container::Kind::Description, 0)?;
     let flawed = |what: &str| {
-        Error::file(format!("the description of this built scene is damaged: {what}"))
-            .at_path(path)
-            .remedy("build it again with `whitted build`")
+        Error::file(format!("the description of this built scene is damaged: {what}")).at_path(path).remedy(AGAIN)
     };
+    let damaged = |error: Error| error.at_path(path).remedy(AGAIN);
     let description: Description = postcard::from_bytes(description).map_err(|cause| flawed(&cause.to_string()))?;
     let sources = description.sources.iter().map(|source| source.check(path)).collect::<Result<Vec<_>>>()?;
     let sources: Vec<PathBuf> = sources.into_iter().flatten().collect();
@@ -271,18 +288,18 @@ pub fn open(path: &Path, progress: &dyn Progress) -> Result<Loaded> {
             root: mesh.root,
             bounds: mesh.bounds,
         });
-        meshes.push(Arc::new(read_mesh(&container, item, mesh).map_err(|error| error.at_path(path))?));
+        meshes.push(Arc::new(read_mesh(&container, item, mesh).map_err(damaged)?));
     }
     let scene = Scene {
         origin: description.origin,
         ambient: description.ambient,
-        background: background.map_err(|error| error.at_path(path))?,
+        background: background.map_err(damaged)?,
         cameras: description.cameras,
         active_camera: description.active_camera,
         film: description.film,
         lights: description.lights,
         materials: description.materials,
-        textures: textures.map_err(|error: Error| error.at_path(path))?,
+        textures: textures.map_err(damaged)?,
         meshes,
         quadrics: description.quadrics,
         objects: description.objects,
@@ -295,6 +312,7 @@ pub fn open(path: &Path, progress: &dyn Progress) -> Result<Loaded> {
         options: description.options,
         fingerprint: description.scene,
         sources,
+        path: path.to_path_buf(),
         bytes,
         check_seconds,
     };

@@ -44,7 +44,7 @@ pub(super) fn build(
     let (names, materials) = materials(&parsed);
     let groups = parsed.names.groups(parsed.faces.corner_counts());
     let smoothing = smoothing_runs(&parsed);
-    let source_faces = options.faces.then(|| source_faces(&parsed).into());
+    let source_faces = if options.faces { source_faces(&parsed) } else { None };
     let indices = cut(&mut parsed, progress)?;
     let mesh = TriangleMesh {
         name: name.to_owned(),
@@ -194,10 +194,13 @@ fn smoothing_runs(parsed: &Parsed) -> Option<Vec<(u32, u32)>> {
     (!runs.is_empty()).then_some(found)
 }
 
-/// The face that each triangle was cut from, numbered from 0 in the order of the file.
-fn source_faces(parsed: &Parsed) -> Vec<u32> {
-    let faces = parsed.faces.numbers_in_file().zip(parsed.faces.corner_counts());
-    faces.flat_map(|(face, corners)| repeat_n(face as u32, corners - 2)).collect()
+/// The face that each triangle was cut from, numbered from 0 in the order of the file; `None` where each is its own.
+fn source_faces(parsed: &Parsed) -> Option<Array<u32>> {
+    let numbers = || {
+        let faces = parsed.faces.numbers_in_file().zip(parsed.faces.corner_counts());
+        faces.flat_map(|(face, corners)| repeat_n(face as u32, corners - 2))
+    };
+    if numbers().zip(0..).all(|(face, triangle)| face == triangle) { None } else { Some(numbers().collect()) }
 }
 
 /// The names of the materials that faces use, and which each triangle has.

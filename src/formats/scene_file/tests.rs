@@ -397,7 +397,7 @@ fn formats_are_told_by_suffix_and_content_and_others_are_refused_with_a_list() {
     assert_eq!(opened(&folder, "scene").unwrap().scene.quadrics.len(), 1);
     std::fs::write(folder.path().join("a.stl"), "solid x").unwrap();
     let message = opened(&folder, "a.stl").unwrap_err().to_string();
-    let expected = "a.stl: .stl is not supported; accepted are .toml (scene), .obj, .gltf and .glb (models)";
+    let expected = "a.stl: .stl is not supported; accepted are .toml (scene), .obj, .gltf and .glb (models) and .whb (built scene)";
     assert!(message.ends_with(expected), "{message}");
     assert!(opened(&folder, "none.obj").unwrap_err().to_string().ends_with("none.obj: there is no such file"));
     assert!(opened(&folder, ".").unwrap_err().to_string().contains("is a folder; name a scene or model file in it"));
