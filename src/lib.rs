@@ -37,7 +37,7 @@
 //! | [`scene`] | plain data: cameras, lights, materials, textures, objects |
 //! | [`accel`] | structures over triangles, and the tree over instances |
 //! | [`render`] | the seed's call graph: ray_tracing, trace, intersect, shade |
-//! | [`formats`] | OBJ, glTF and scene files in, pictures out |
+//! | [`formats`] | OBJ, glTF, scene files and built scenes in, pictures out |
 //! | [`job`] | tiles that are kept, shared and merged |
 //! | `measure` | exact answers, the hard cases, speed against error, the bench, behind the feature `measure` |
 //! | `editor` | a scene edited by commands, and the window that shows it, behind the feature `editor` |
