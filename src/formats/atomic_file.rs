@@ -166,9 +166,16 @@ impl Temporary {
     fn persist(self, target: &Path) -> io::Result<()> {
         match self {
             #[cfg(target_os = "linux")]
-            Self::Nameless(file, folder) => {
+            Self::Nameless(mut file, folder) => {
                 // A name that nothing has, for the moment until it gets its own.
-                let named = Self::builder().make_in(folder, |path| give_name(&file, path))?;
+                if let Ok(named) = Self::builder().make_in(&folder, |path| give_name(&file, path)) {
+                    return named.persist(target).map(drop).map_err(|failed| failed.error);
+                }
+                // Some systems refuse names to what had none.
+                let mut named = Self::builder().tempfile_in(folder)?;
+                file.rewind()?;
+                io::copy(&mut file, &mut named)?;
+                named.as_file().sync_all()?;
                 named.persist(target).map(drop).map_err(|failed| failed.error)
             }
             Self::Named(file) => file.persist(target).map(drop).map_err(|failed| failed.error),
