@@ -32,7 +32,7 @@
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`array`], [`math`], [`error`], [`progress`] | values in memory or in a mapped file; arithmetic with a fixed order of sums; one error type; progress and cancellation |
+//! | [`mod@array`], [`math`], [`error`], [`progress`] | values in memory or in a mapped file; arithmetic with a fixed order of sums; one error type; progress and cancellation |
 //! | [`geometry`] | rays, boxes, the triangle test, meshes, quadrics |
 //! | [`scene`] | plain data: cameras, lights, materials, textures, objects |
 //! | [`accel`] | structures over triangles, and the tree over instances |

@@ -57,7 +57,7 @@ pub fn run(arguments: &BuildSceneArguments) -> Result<()> {
     if formats::is_built(input)? {
         return Err(Error::caller("this scene is built already").at_path(input));
     }
-    if output.extension().is_none_or(|suffix| suffix != "whb") {
+    if output.extension().is_none_or(|suffix| !suffix.eq_ignore_ascii_case("whb")) {
         let error = Error::caller("the name of a built scene ends in .whb");
         return Err(error.at_path(&output).remedy("name it so"));
     }

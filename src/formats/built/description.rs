@@ -118,13 +118,16 @@ impl SourceFile {
         let (bytes, modified) = state(path).map_err(system)?;
         let content = fingerprint::content(path)?;
         let since = since.duration_since(UNIX_EPOCH).unwrap_or_default();
-        if modified.is_some_and(|modified| modified >= since) || state(path).map_err(system)? != (bytes, modified) {
+        let now = UNIX_EPOCH.elapsed().unwrap_or_default();
+        // A time that is yet to come says nothing.
+        let is_changed = modified.is_some_and(|modified| (since..=now).contains(&modified));
+        if is_changed || state(path).map_err(system)? != (bytes, modified) {
             return Err(Error::file("the file was changed while the scene was built")
                 .at_path(path)
                 .remedy("build it again"));
         }
-        let is_old = |time: &Duration| UNIX_EPOCH.elapsed().is_ok_and(|now| *time + COARSEST_CLOCK < now);
-        let path = RawPath::of(&relative_to(path, target));
+        let is_old = |time: &Duration| *time + COARSEST_CLOCK < now;
+        let path = RawPath::of(&relative_to(path, &where_it_is(target)));
         Ok(Self { path, bytes, modified: modified.filter(is_old), content })
     }
 
@@ -138,8 +141,7 @@ impl SourceFile {
     /// # Errors
     /// When it has changed.
     pub fn check(&self, target: &Path) -> Result<Option<PathBuf>> {
-        let target = std::fs::canonicalize(target).unwrap_or_else(|_| target.to_path_buf());
-        let path = folder_of(&target).join(self.path.path());
+        let path = folder_of(&where_it_is(target)).join(self.path.path());
         let Ok(metadata) = std::fs::metadata(&path) else { return Ok(None) };
         let (bytes, modified) = state_of(&metadata);
         let is_same = metadata.is_file()
@@ -149,9 +151,16 @@ impl SourceFile {
             return Ok(Some(path));
         }
         Err(Error::file(format!("`{}` is not what this scene was built from any more", path.display()))
-            .at_path(&target)
+            .at_path(target)
             .remedy("build it again with `whitted build`, or, if that is another file, move one of them"))
     }
+}
+
+/// Where a built scene is, or will be: where a link to it leads, or as the path says.
+fn where_it_is(target: &Path) -> PathBuf {
+    let is_link = std::fs::symlink_metadata(target).is_ok_and(|metadata| metadata.is_symlink());
+    let real = if is_link { std::fs::canonicalize(target).ok() } else { None };
+    real.unwrap_or_else(|| target.to_path_buf())
 }
 
 /// A file's size and the time of its last change, where that is known.

@@ -1,7 +1,7 @@
 //! Scenes that are kept as they were built: geometry, trees, images and materials in one file, which is mapped into memory instead of
 //! being read and built.
 //!
-//! Its [head](container) tells of every section where it is and what its checksum is. Opening a file checks all of them, and every
+//! Its head tells of every section where it is and what its checksum is. Opening a file checks all of them, and every
 //! number that names something else, whatever its checksum says; that boxes of trees contain what is below them is left to checksums. Of
 //! the files that the scene was built from, those that are still there must be the same.
 

@@ -71,24 +71,32 @@ fn scene() -> Scene {
     }
 }
 
+/// Keeps what is said to have been read from a file since a moment.
+fn save_from(input: &Path, since: SystemTime, renderer: &Renderer, path: &Path) -> Result<u64> {
+    let mut ledger = Ledger::default();
+    ledger.note_file(input);
+    let (options, automatic) = (&LoadOptions::default(), Automatic::default());
+    save(
+        renderer,
+        &Origin { input, options, since, ledger: &ledger, automatic, preset: Preset::Balanced },
+        path,
+        &Silent,
+    )
+}
+
+/// When a file that was just written is older.
+fn later() -> SystemTime {
+    SystemTime::now() + Duration::from_secs(1)
+}
+
 /// A built scene in a folder, beside the file that it is said to be built from.
 fn built(kind: Kind) -> (tempfile::TempDir, PathBuf, Renderer) {
     let folder = tempfile::tempdir().unwrap();
     let input = folder.path().join("input.toml");
     std::fs::write(&input, "not read").unwrap();
     let renderer = Renderer::build(scene(), &Params { kind, ..Params::default() }, &Silent).unwrap();
-    let mut ledger = Ledger::default();
-    ledger.note_file(&input);
-    let origin = Origin {
-        input: &input,
-        options: &LoadOptions::default(),
-        since: SystemTime::now() + Duration::from_secs(1),
-        ledger: &ledger,
-        automatic: Automatic::default(),
-        preset: Preset::Balanced,
-    };
     let path = folder.path().join("scene.whb");
-    let bytes = save(&renderer, &origin, &path, &Silent).unwrap();
+    let bytes = save_from(&input, later(), &renderer, &path).unwrap();
     assert_eq!(bytes, std::fs::metadata(&path).unwrap().len());
     (folder, path, renderer)
 }
@@ -318,8 +326,12 @@ fn sources_are_found_through_links_and_are_the_same_links() {
         let link = other.path().join("link.whb");
         std::os::unix::fs::symlink(&path, &link).unwrap();
         assert_eq!(open(&link, &Silent).unwrap().built.unwrap().sources.len(), 1);
+        // Also to one that is built through it.
+        save_from(&input, later(), &renderer, &link).unwrap();
+        assert!(std::fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(open(&link, &Silent).unwrap().built.unwrap().sources.len(), 1);
         std::fs::write(&input, "other").unwrap();
-        assert!(open(&link, &Silent).is_err());
+        assert_eq!(open(&link, &Silent).unwrap_err().path(), Some(link.as_path()));
         // A source that is a link is what it leads to now.
         let [one, two] = ["one", "two"].map(|name| folder.path().join(name));
         std::fs::write(&one, "not read").unwrap();
@@ -336,19 +348,16 @@ fn sources_are_found_through_links_and_are_the_same_links() {
         assert!(open(&path, &Silent).is_err());
         std::fs::remove_file(&input).unwrap();
     }
+    // A time that is yet to come is no change.
+    std::fs::write(&input, "not read").unwrap();
+    let tomorrow = SystemTime::now() + Duration::from_secs(86_400);
+    std::fs::File::open(&input).unwrap().set_modified(tomorrow).unwrap();
+    save_from(&input, SystemTime::now(), &renderer, &path).unwrap();
+    assert!(open(&path, &Silent).is_ok());
     // What changes while it is built is found out.
     std::fs::write(&input, "changed").unwrap();
-    let mut ledger = Ledger::default();
-    ledger.note_file(&input);
-    let origin = Origin {
-        input: &input,
-        options: &LoadOptions::default(),
-        since: SystemTime::now() - Duration::from_secs(1),
-        ledger: &ledger,
-        automatic: Automatic::default(),
-        preset: Preset::Balanced,
-    };
-    let message = save(&renderer, &origin, &path, &Silent).unwrap_err().to_string();
+    let before = SystemTime::now() - Duration::from_secs(1);
+    let message = save_from(&input, before, &renderer, &path).unwrap_err().to_string();
     assert!(message.contains("input.toml") && message.contains("changed while the scene was built"), "{message}");
 }
 
@@ -361,18 +370,8 @@ fn paths_need_not_be_text() {
     std::fs::create_dir(&odd).unwrap();
     let input = odd.join("input.toml");
     std::fs::write(&input, "not read").unwrap();
-    let mut ledger = Ledger::default();
-    ledger.note_file(&input);
-    let origin = Origin {
-        input: &input,
-        options: &LoadOptions::default(),
-        since: SystemTime::now() + Duration::from_secs(1),
-        ledger: &ledger,
-        automatic: Automatic::default(),
-        preset: Preset::Balanced,
-    };
     let path = folder.path().join("odd.whb");
-    save(&renderer, &origin, &path, &Silent).unwrap();
+    save_from(&input, later(), &renderer, &path).unwrap();
     assert_eq!(open(&path, &Silent).unwrap().built.unwrap().sources.len(), 1);
     std::fs::write(&input, "other").unwrap();
     assert!(open(&path, &Silent).is_err());
